@@ -21,13 +21,6 @@ _PAUSE = (
     r"(?:(?:an?|one|two|three|some|\d+) )?(?:short |brief |little |few |couple of )?"
     r"(?:moment|while|pause|beat|bit|second|time)s?"
 )
-_AFTER = re.compile(
-    r"^\W*(?:and )?(?:(?:right |just |shortly )?(?:after|once(?= (?:he|she|they|it|the|his|her|a)\b))|but first"
-    r"|before that|having)\b",
-    re.IGNORECASE,
-)
-_AFTER_THAT = re.compile(rf"^\W*(?:and )?(?:after (?:that|this|which|{_PAUSE})|afterwards?)\b", re.IGNORECASE)
-_BEFORE = re.compile(r"^\W*(?:right |just |shortly )?before\b", re.IGNORECASE)
 _JOINING = re.compile(
     r"^(?:[\s,.;:+/>→\-–—&(]+|(?:and|then|next|finally|afterwards?|first|before"
     rf"|after(?: (?:that|this|{_PAUSE}))?|until|once|while|as|followed by|but|having|ending with)\b\s*)+",
@@ -108,12 +101,14 @@ class ReadClause:
         probability: 0 to 1.
         text: as written.
         at_once: it comes at the same time as the clause before it.
+        place: in time, among the clauses of the prompt that ask for a movement.
     """
 
     name: str
     probability: float
     text: str
     at_once: bool = False
+    place: int = 0
 
 
 def without_joints(text: str) -> str:
@@ -125,27 +120,17 @@ def without_joints(text: str) -> str:
 def in_order(clauses: Sequence[ReadClause]) -> list[list[ReadClause]]:
     """Return clauses in groups, in the order of time; those of a group come at once.
 
-    Clauses that ask for nothing are left out. One action in two clauses behind each other is one. "Waves after she sat
-    down" and "before leaving, he bows" are told in the other order.
+    Clauses that ask for nothing are left out. One action in two clauses behind each other is one.
     """
     groups: list[list[ReadClause]] = []
-    at = 0
-    for before, clause in zip([None, *clauses], clauses, strict=False):
+    for clause in clauses:
         if clause.name == CONTEXT:
             continue
-        if not groups:
-            groups.append([clause])
-        elif before is not None and before is clauses[0] and _BEFORE.match(before.text):
-            groups.insert(at, [clause])
-        elif _AFTER.match(clause.text) and not _AFTER_THAT.match(clause.text):
-            groups.insert(at, [clause])
-            at += 1
-        elif clause.at_once:
-            groups[at].append(clause)
+        if groups and clause.at_once:
+            groups[-1].append(clause)
         else:
-            at += 1
-            groups.insert(at, [clause])
-    return _merged(groups)
+            groups.append([clause])
+    return _merged(sorted(groups, key=lambda group: group[0].place))
 
 
 def _merged(groups: Sequence[list[ReadClause]]) -> list[list[ReadClause]]:
@@ -156,7 +141,8 @@ def _merged(groups: Sequence[list[ReadClause]]) -> list[list[ReadClause]]:
         alike = alike and not is_on_other_side(last[0].text, group[0].text, group[0].name)
         if alike:
             surer = max(group[0].probability, last[0].probability)
-            merged[-1] = [ReadClause(group[0].name, surer, f"{last[0].text} {group[0].text}")]
+            text = f"{last[0].text} {group[0].text}"
+            merged[-1] = [replace(group[0], probability=surer, text=text, place=last[0].place)]
         else:
             merged.append(group)
     return merged
@@ -216,4 +202,5 @@ def parted(clauses: Iterable[ReadClause]) -> Iterator[ReadClause]:
             yield clause if named is None else replace(clause, name=named, probability=PLAIN)
             continue
         for place, (text, action) in enumerate(parts):
-            yield ReadClause(action, max(clause.probability, PLAIN), text, clause.at_once and place == 0)
+            surer = max(clause.probability, PLAIN)
+            yield ReadClause(action, surer, text, clause.at_once and place == 0, clause.place)

@@ -10,6 +10,7 @@ from marey.bundles import TextSpec, find_bundle
 from marey.core.errors import InvalidBundle
 from marey.core.settings import Settings, settings
 from marey.text.action_reader import reader_sha256
+from marey.text.order_reader import order_reader_sha256
 from marey.text.plain_action import VERSION as PLAIN_ACTION_VERSION
 from marey.text.reading_encoder import reading_encoder_sha256
 from marey.text.sequence_reader import VERSION as SEQUENCE_VERSION
@@ -57,7 +58,8 @@ def feature_key(prompt: str, spec: TextSpec) -> str:
         words = [load_vocabulary().sha256, bearings_sha256()]
         parts.append(["plain_action", PLAIN_ACTION_VERSION, *words, reader_sha256(), reading_encoder_sha256()])
     if spec.movements:
-        parts.append(["movements", SEQUENCE_VERSION, load_vocabulary().sha256, sequence_reader_sha256()])
+        readers = [sequence_reader_sha256(), order_reader_sha256()]
+        parts.append(["movements", SEQUENCE_VERSION, load_vocabulary().sha256, *readers])
     return hashlib.sha256(json.dumps(parts, ensure_ascii=False).encode()).hexdigest()
 
 

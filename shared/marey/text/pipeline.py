@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -30,6 +31,8 @@ from marey.text.keys import NO_LABELLER, feature_key
 from marey.text.labellers import OneAtATime
 from marey.text.loading import load_encoder, load_labeller, load_rewriter
 from marey.text.misleading_words import without_misleading
+from marey.text.order_reader import FILE as ORDER_FILE
+from marey.text.order_reader import order_reader
 from marey.text.parsed import ParsedPrompt, warnings_of, without_punctuation
 from marey.text.plain_action import only_action, with_subject
 from marey.text.plain_phrases import with_plain_phrases
@@ -88,7 +91,7 @@ class TextPipeline:
         self.encoder = encoder
         self._speller: Speller | None = None
         self._texts = EncodedTexts(encoder)
-        self._texts_to_read = self._encoded_for_readers()
+        self._texts_to_read, self._texts_to_order = self._encoded_for_readers()
 
     @classmethod
     def load(cls, spec: TextSpec, *, encoder_path: Path | None = None) -> TextPipeline:
@@ -253,19 +256,22 @@ class TextPipeline:
         if not self.spec.plain_action:
             return [ReadPrompt(text) for text in texts]
         texts = [_in_known_words(text) for text in texts]
-        encoded = self._texts_to_read
-        if encoded is None:
+        encoded, ordered = self._texts_to_read, self._texts_to_order
+        if encoded is None or ordered is None:
             return [ReadPrompt.of(text, only_action(text)) for text in texts]
-        return TrainedReaders(encoded.pooled, encoded.encodings, movements=self.spec.movements).read(texts)
+        in_time = partial(order_reader().order, encode=ordered.encode)
+        return TrainedReaders(encoded.pooled, encoded.encodings, in_time, movements=self.spec.movements).read(texts)
 
-    def _encoded_for_readers(self) -> EncodedTexts | None:
-        """Return the texts as the readers read them; None if prompts are read by their words alone, as with encoders
-        that the readers were not trained for."""
+    def _encoded_for_readers(self) -> tuple[EncodedTexts, EncodedTexts] | tuple[None, None]:
+        """Return the texts as the readers read them, and as that of the order of time does; None if prompts are read by
+        their words alone, as with encoders that the readers were not trained for."""
         if not self.spec.plain_action or action_reader().encoder_sha256 != self.encoder.sha256:
-            return None
+            return None, None
         from marey.text.minilm_encoder import MiniLMEncoder
 
-        return EncodedTexts(reading_encoder(self.encoder)) if isinstance(self.encoder, MiniLMEncoder) else None
+        if not isinstance(self.encoder, MiniLMEncoder):
+            return None, None
+        return EncodedTexts(reading_encoder(self.encoder)), EncodedTexts(reading_encoder(self.encoder, ORDER_FILE))
 
     def _read(self, readings: Sequence[ReadPrompt]) -> list[tuple[SemanticGraph, tuple[str, ...]]]:
         """Graph and actions of each text; with `TextSpec.in_order`, the graph of its actions joined in order of

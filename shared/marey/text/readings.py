@@ -100,6 +100,7 @@ class TrainedReaders:
         self,
         pooled: Callable[[Sequence[str]], Sequence[Float32]],
         encode: Callable[[Sequence[str]], Sequence[Encoding]],
+        in_time: Callable[[Sequence[str], Sequence[bool]], Sequence[int]],
         *,
         movements: bool,
     ) -> None:
@@ -108,9 +109,10 @@ class TrainedReaders:
         Args:
             pooled: returns the sentence vectors (W,) of texts, by the encoder of the readers.
             encode: returns the encodings of texts.
+            in_time: returns the order of clauses in time (`SequenceReader.read`).
             movements: a prompt of several movements is read movement by movement.
         """
-        self._pooled, self._encode, self._movements = pooled, encode, movements
+        self._pooled, self._encode, self._in_time, self._movements = pooled, encode, in_time, movements
         self._actions: dict[str, ReadAction] = {}
         self._encodings: dict[str, Encoding] = {}
 
@@ -337,7 +339,7 @@ class TrainedReaders:
         if action is None and (way := way_to_a_stop(bare.prompt)) and (ends := self._read_action(way).action) in WAYS:
             action = ends  # "sprints forward then stops suddenly"
         encoding = self._encodings.get(bare.text) or self._encode([bare.text])[0]
-        movements = sequence_reader().read(bare, encoding, self._pooled, action)
+        movements = sequence_reader().read(bare, encoding, self._pooled, self._in_time, action)
         if not lunges_as_exercise(bare.prompt):
             return movements
         return tuple(

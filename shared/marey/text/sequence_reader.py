@@ -176,6 +176,7 @@ class SequenceReader(Reader):
         bare: BarePrompt,
         encoding: Encoding,
         pooled: Callable[[Sequence[str]], Sequence[Float32]],
+        in_time: Callable[[Sequence[str], Sequence[bool]], Sequence[int]],
         action: str | None = None,
     ) -> tuple[ReadMovement, ...]:
         """Return the movements of a prompt in the order of time; none if it does not ask for several, one after the
@@ -189,12 +190,14 @@ class SequenceReader(Reader):
             bare: the prompt, and the text of it that is read.
             encoding: of that text.
             pooled: returns the sentence vectors (W,) of texts.
+            in_time: returns the numbers of the clauses that ask for a movement, in the order of time, from all clauses
+                as they are written, and whether each asks for one (`OrderReader.order`).
             action: that the reader of actions takes the prompt for; None = several, none, or in doubt.
         """
         if way := way_to_rest(bare.prompt, action):
             several = [ReadMovement(text, one) for text, one in parts_in_time(way)]  # "jogs, slows to a walk and stops"
             return (*(several or [ReadMovement(way, action)]), rest())
-        written = self._clauses(bare, encoding, pooled)
+        written = _placed(self._clauses(bare, encoding, pooled), in_time)
         whole = list(parted(with_belongings(written)))
         if len(whole) == 1 < len(written) and (whole[0].name in BOUND_TO_HANDS or _is_doubtless(whole[0])):
             return (ReadMovement(bare.prompt, whole[0].name),)
@@ -262,6 +265,15 @@ class SequenceReader(Reader):
         scores = hidden @ weights["out"].T + weights["out_bias"]
         shares = np.exp(scores - scores.max(axis=1, keepdims=True))
         return (shares / shares.sum(axis=1, keepdims=True))[:, : len(self.classes)]
+
+
+def _placed(
+    clauses: Sequence[ReadClause], in_time: Callable[[Sequence[str], Sequence[bool]], Sequence[int]]
+) -> list[ReadClause]:
+    """Return clauses with their places in time."""
+    order = in_time([clause.text for clause in clauses], [clause.name != CONTEXT for clause in clauses])
+    place_of = {number: place for place, number in enumerate(order)}
+    return [replace(clause, place=place_of.get(number, 0)) for number, clause in enumerate(clauses)]
 
 
 def clause_inputs(

@@ -25,7 +25,7 @@ from marey.text.reader_file import Float32
 from marey.text.sequence_reader import SequenceReader
 from marey.vocabulary.bearing_words import as_written
 from marey.vocabulary.entries import load_vocabulary
-from tests.support.texts import shared_encoder
+from tests.support.texts import order_of_time, shared_encoder
 
 
 @pytest.fixture(scope="module")
@@ -104,7 +104,7 @@ def test_a_reader_of_sequences_learns_its_texts(monkeypatch: pytest.MonkeyPatch)
     classes, weights = sequence_training.train([*some, *several * 5], encoder, 0)
     reader = SequenceReader(classes, encoder.sha256, {name: part.astype(np.float16) for name, part in weights.items()})
     read = [
-        reader.read(as_written(text.text), encoding, encoder.pooled)
+        reader.read(as_written(text.text), encoding, encoder.pooled, order_of_time)
         for text, encoding in zip(several, encoder.encodings([text.text for text in several]), strict=True)
     ]
     right = [

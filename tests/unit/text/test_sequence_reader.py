@@ -32,7 +32,7 @@ from marey.text.sequence_reader import (
 from marey.vocabulary.bearing_words import as_written
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.scope import STANDING
-from tests.support.texts import shared_encoder, shared_pipeline, shared_reading_encoder
+from tests.support.texts import order_of_time, shared_encoder, shared_pipeline, shared_reading_encoder
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +44,7 @@ def reading() -> TextPipeline:
 
 def read(prompt: str) -> tuple[ReadMovement, ...]:
     encoder = shared_reading_encoder()
-    return sequence_reader().read(as_written(prompt), encoder.encode(prompt), encoder.pooled)
+    return sequence_reader().read(as_written(prompt), encoder.encode(prompt), encoder.pooled, order_of_time)
 
 
 def test_it_knows_every_action_and_the_shipped_encoder() -> None:
@@ -147,27 +147,34 @@ def test_a_blow_in_a_sequence_is_short(reading: TextPipeline) -> None:
 
 
 def clauses(*written: str) -> list[ReadClause]:
+    """Return clauses written as `name:text`, each with its place in time before the name if it is not that in the
+    text: `2 name:text`."""
     named = [each.partition(":") for each in written]
-    return [ReadClause(name, 0.9, text.strip(), at_once=text.startswith("&")) for name, _, text in named]
+    return [
+        ReadClause(
+            name.split()[-1], 0.9, text.strip(), text.startswith("&"), int(name.split()[0]) if " " in name else at
+        )
+        for at, (name, _, text) in enumerate(named, 1)
+    ]
 
 
 @pytest.mark.parametrize(
     ("written", "groups"),
     [
         (["walk:he walks", "bow:and bows"], [["walk"], ["bow"]]),
-        (["bow:he bows", "sit:after sitting", "wave:then waves"], [["sit"], ["bow"], ["wave"]]),
-        (["walk:before leaving", "bow:he bows", "wave:then waves"], [["bow"], ["wave"], ["walk"]]),
+        (["2 bow:he bows", "1 sit:after sitting", "wave:then waves"], [["sit"], ["bow"], ["wave"]]),
         (["walk:he walks", "wave:&while waving", "bow:then bows"], [["walk", "wave"], ["bow"]]),
-        (["walk:he walks", "bow:after that he bows"], [["walk"], ["bow"]]),
-        (["walk:he walks", "bow:after a few seconds he bows"], [["walk"], ["bow"]]),
-        (["walk:he walks", "bow:once up there, he bows"], [["walk"], ["bow"]]),
-        (["walk:he walks", "bow:once he has bowed"], [["bow"], ["walk"]]),
-        ([f"{CONTEXT}:while the others eat", "walk:he walks", "bow:and bows"], [["walk"], ["bow"]]),
+        (["3 walk:he walks", "wave:&while waving", "1 bow:having bowed"], [["bow"], ["walk", "wave"]]),
         (["hop:hops", "hop:and hops again", "bow:then bows"], [["hop"], ["bow"]]),
     ],
 )
-def test_the_order_of_time(written: list[str], groups: list[list[str]]) -> None:
+def test_groups_of_clauses_in_the_order_of_time(written: list[str], groups: list[list[str]]) -> None:
     assert [[clause.name for clause in group] for group in in_order(clauses(*written))] == groups
+
+
+def test_clauses_that_ask_for_nothing_are_left_out() -> None:
+    context = ReadClause(CONTEXT, 0.9, "while the others eat")
+    assert in_order([context, ReadClause("walk", 0.9, "he walks")]) == [[ReadClause("walk", 0.9, "he walks")]]
 
 
 def test_a_long_list_of_clauses_is_read_in_bounded_time() -> None:

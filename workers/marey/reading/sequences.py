@@ -9,7 +9,8 @@ from __future__ import annotations
 import random
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import starmap
 
 from marey.data.captions import lower_first, seeded
 from marey.data.spoken import SUBJECTS
@@ -40,11 +41,13 @@ class TextPart:
         text: as written, with the words that join it to others.
         asks: id of an action, `OUTSIDE` or `CONTEXT`.
         at_once: it comes at the same time as the part before.
+        place: in time, from 1 on, among the parts that ask for a movement; 0 = that of the text.
     """
 
     text: str
     asks: str
     at_once: bool = False
+    place: int = 0
 
 
 @dataclass(frozen=True)
@@ -59,6 +62,18 @@ class PartedText:
         """Return the whole."""
         return "".join(part.text for part in self.parts)
 
+    def places(self) -> list[int]:
+        """Return the place in time of each part, from 1 on; equal for those at once, 0 for one without a movement."""
+        found: list[int] = []
+        place = last = 0
+        for part in self.parts:
+            moves = part.asks != CONTEXT
+            place += moves
+            at = part.place or (last if part.at_once and last else place)
+            found.append(at if moves else 0)
+            last = at if moves else last
+        return found
+
 
 @dataclass(frozen=True)
 class _Joint:
@@ -71,6 +86,7 @@ class _Joint:
         weight: how often it is drawn.
         forms: of both parts: `v`erb phrase, with a `s`ubject, or `g`erund.
         at_once: both come at the same time.
+        earlier: the second comes before the first.
     """
 
     first: str
@@ -79,6 +95,7 @@ class _Joint:
     weight: float
     forms: str = "vv"
     at_once: bool = False
+    earlier: bool = False
 
 
 _JOINTS = (
@@ -119,13 +136,29 @@ _JOINTS = (
     _Joint("once ", ",", " ", 0.7, "ss"),
     _Joint("having finished ", ",", " ", 0.3, "gs"),
     _Joint("when done ", ",", " ", 0.2, "gs"),
-    _Joint("", "", " after ", 1.5, "sg"),
-    _Joint("", "", " after ", 0.5, "ss"),
-    _Joint("", "", " once ", 0.5, "ss"),
-    _Joint("before ", ",", " ", 1.5, "gs"),
-    _Joint("before ", ",", " ", 0.4, "ss"),
-    _Joint("", ",", " but first ", 0.5),
-    _Joint("", ";", " before that ", 0.3),
+    _Joint("", "", " prior to ", 0.4, "sg"),
+    _Joint("", "", " right before ", 0.4, "sg"),
+    _Joint("", "", " and only then ", 0.3),
+    _Joint("", ",", " after which he ", 0.3, "sv"),
+    _Joint("", "", " and once that is done ", 0.2, "vs"),
+    _Joint("starts by ", ",", " then ", 0.4, "gv"),
+    _Joint("", ",", " which leads into ", 0.2, "vg"),
+    _Joint("", "", " after ", 1.5, "sg", earlier=True),
+    _Joint("", "", " after ", 0.5, "ss", earlier=True),
+    _Joint("", "", " once ", 0.5, "ss", earlier=True),
+    _Joint("", "", " right after ", 0.4, "sg", earlier=True),
+    _Joint("", ",", " but only after ", 0.4, "sg", earlier=True),
+    _Joint("", ",", " but not before ", 0.3, "sg", earlier=True),
+    _Joint("", ",", " this after ", 0.3, "sg", earlier=True),
+    _Joint("", "", " following ", 0.3, "sg", earlier=True),
+    _Joint("", ",", " having first finished ", 0.3, "sg", earlier=True),
+    _Joint("", "", " as soon as he is done ", 0.3, "sg", earlier=True),
+    _Joint("before ", ",", " ", 1.5, "gs", earlier=True),
+    _Joint("before ", ",", " ", 0.4, "ss", earlier=True),
+    _Joint("prior to ", ",", " ", 0.5, "gs", earlier=True),
+    _Joint("", ",", " but first ", 0.5, earlier=True),
+    _Joint("", ",", " but before that ", 0.3, earlier=True),
+    _Joint("", ";", " before that ", 0.3, earlier=True),
     _Joint("", "", " while ", 1.5, "sg", at_once=True),
     _Joint("", "", " as ", 0.7, "ss", at_once=True),
     _Joint("", "", " and at the same time ", 0.5, "vv", at_once=True),
@@ -135,6 +168,7 @@ _JOINTS = (
     _Joint("", ",", " ", 0.8, "sg", at_once=True),
     _Joint("", "", " at the same time as ", 0.3, "sg", at_once=True),
 )
+_FIRST_AND_THEN = _JOINTS[0]
 _WEIGHTS = [joint.weight for joint in _JOINTS]
 _LATER = tuple(joint for joint in _JOINTS if not joint.first)
 _LATER_WEIGHTS = [joint.weight for joint in _LATER]
@@ -156,12 +190,13 @@ def parted_texts(seed: int) -> list[PartedText]:
 def written_parts() -> Iterator[tuple[TextPart, ...]]:
     """Yield the texts that people wrote, in parts."""
     for text, asks in several_texts():
-        marks = [ask.partition("#")[0] for ask in asks.split()]
-        pieces = text.split("|")
-        yield tuple(
-            TextPart(piece, {"-": CONTEXT, "?": OUTSIDE}.get(mark.lstrip("&"), mark.lstrip("&")), mark.startswith("&"))
-            for piece, mark in zip(pieces, marks, strict=True)
-        )
+        yield tuple(starmap(_written_part, zip(text.split("|"), asks.split(), strict=True)))
+
+
+def _written_part(text: str, ask: str) -> TextPart:
+    mark, _, place = ask.partition("#")
+    name = mark.lstrip("&")
+    return TextPart(text, {"-": CONTEXT, "?": OUTSIDE}.get(name, name), mark.startswith("&"), int(place or 0))
 
 
 def _made(single: Sequence[LabelledText], seed: int) -> Iterator[PartedText]:
@@ -230,14 +265,21 @@ class _Speaker:
 def _joined(speaker: _Speaker) -> list[TextPart]:
     actions = speaker.actions()
     (joint,) = speaker.rng.choices(_JOINTS, _WEIGHTS)
+    joint = _FIRST_AND_THEN if joint.earlier and not joint.first and len(actions) > 2 else joint
+    last = len(actions) if joint.earlier and joint.first else 0  # "before sitting, he waves and bows"
     parts = [TextPart(joint.first + speaker.say(actions[0], joint.forms[0], first=joint.forms[0] != "g"), actions[0])]
+    parts[0] = replace(parts[0], place=last or (2 if joint.earlier else 1))
     for number, action in enumerate(actions[1:]):
         if number:
             (joint,) = speaker.rng.choices(_LATER, _LATER_WEIGHTS)
+            joint = _FIRST_AND_THEN if joint.earlier and (last or number < len(actions) - 2) else joint
         said = speaker.say(action, joint.forms[1], first=number == 0 and joint.forms[0] == "g")
         said = f"{said[:1].upper()}{said[1:]}" if joint.ends == "." and joint.between == " " else said
-        parts[-1] = TextPart(parts[-1].text + joint.ends, parts[-1].asks, parts[-1].at_once)
-        parts.append(TextPart(joint.between + said, action, joint.at_once))
+        parts[-1] = replace(parts[-1], text=parts[-1].text + joint.ends)
+        place = parts[-1].place if joint.at_once else number + (1 if last else 2)
+        if joint.earlier and not last:
+            parts[-1], place = replace(parts[-1], place=number + 2), number + 1
+        parts.append(TextPart(joint.between + said, action, joint.at_once, place))
     return parts
 
 
@@ -245,8 +287,8 @@ def _finished(parts: list[TextPart], rng: random.Random) -> list[TextPart]:
     """Write parts as a sentence, as a request, or as they are."""
     first, last = parts[0], parts[-1]
     if rng.random() < _SENTENCE:
-        parts[-1] = TextPart(f"{last.text}.", last.asks, last.at_once)
-        parts[0] = TextPart(f"{first.text[:1].upper()}{first.text[1:]}", first.asks)
+        parts[-1] = replace(last, text=f"{last.text}.")
+        parts[0] = replace(first, text=f"{first.text[:1].upper()}{first.text[1:]}")
     elif rng.random() < _ASKED:
-        parts[0] = TextPart(rng.choice(_REQUESTS) + first.text, first.asks)
+        parts[0] = replace(first, text=rng.choice(_REQUESTS) + first.text)
     return parts

@@ -26,29 +26,23 @@ from marey.motion.files import write_atomically
 from marey.reading.networks import as_arrays
 from marey.reading.sequences import PartedText, TextPart, parted_texts
 from marey.reading.train_sequences import LabelledTokens, batches, cut_loss, labelled, shown
+from marey.reading.updates import UpdatedLayers
 from marey.text.action_reader import OUTSIDE, SEVERAL, word_marks
 from marey.text.clause_order import CONTEXT, without_joints
 from marey.text.encoders import Encoding, find_encoder
-from marey.text.minilm import EPS, HEADS, MiniLM
+from marey.text.minilm import MiniLM
 from marey.text.minilm_bundle import LAYERS, WIDTH, load_weights
 from marey.text.reading_encoder import FILE
 from marey.vocabulary.entries import load_vocabulary
 
-UPDATED, RANK = 2, 16
-"""Layers that get updates, from the last one on, and the rank of these."""
+UPDATED = 2
+"""Layers that get updates, from the last one on."""
 EPOCHS, BATCH, CLIPPED = 7, 96, 1.0
 RATE, HEAD_RATE, DECAY, HEAD_DECAY, WARMUP = 1e-3, 2e-3, 0.01, 0.02, 200
-DROPOUT, INPUT_DROPOUT, HEAD_DROPOUT = 0.1, 0.15, 0.4
+INPUT_DROPOUT, HEAD_DROPOUT = 0.15, 0.4
 UNITS, VECTOR_SCALE, SMOOTHING = 256, 10.0, 0.05
 CUT_WEIGHT = 0.5
 """Weight of the beginnings beside what the parts ask for."""
-MATRICES = {
-    "project": ("attention.self.query", "attention.self.key", "attention.self.value"),
-    "attended": ("attention.output.dense",),
-    "inner": ("intermediate.dense",),
-    "outer": ("output.dense",),
-}
-"""Matrices of a layer, by those of BERT that are rows of each."""
 
 
 @dataclass(frozen=True)
@@ -70,68 +64,19 @@ class _Text:
     spans: list[_Span]
 
 
-class _Linear(nn.Module):
-    """Frozen matrices of BERT, one behind the other, each with a low-rank update."""
-
-    def __init__(self, weights: Mapping[str, Tensor], names: Sequence[str]) -> None:
-        super().__init__()
-        self.weight, self.bias = (
-            torch.cat([weights[f"{name}.{part}"] for name in names]) for part in ("weight", "bias")
-        )
-        out, width = self.weight.shape
-        self.downs = nn.Parameter(torch.randn(len(names) * RANK, width) * width**-0.5)
-        self.ups = nn.Parameter(torch.zeros(out, RANK))
-        self._many = len(names)
-
-    def up(self) -> Tensor:
-        """Return the second factor (out, rank), in which the rows of a matrix read the columns of its own update."""
-        return torch.block_diag(*self.ups.chunk(self._many))
-
-    def forward(self, x: Tensor) -> Tensor:
-        """(…, in) to (…, out)."""
-        return F.linear(x, self.weight, self.bias) + F.linear(F.linear(x, self.downs), self.up())
-
-
-class _Layer(nn.Module):
-    """A layer of BERT with updates."""
-
-    def __init__(self, weights: Mapping[str, Tensor], number: int) -> None:
-        super().__init__()
-        prefix = f"encoder.layer.{number}."
-        parts = {name: _Linear(weights, [prefix + part for part in of]) for name, of in MATRICES.items()}
-        self.parts = nn.ModuleDict(parts)
-        self.drop = nn.Dropout(DROPOUT)
-        self._norms = [
-            (weights[f"{prefix}{name}.LayerNorm.weight"], weights[f"{prefix}{name}.LayerNorm.bias"])
-            for name in ("attention.output", "output")
-        ]
-
-    def forward(self, hidden: Tensor, real: Tensor) -> Tensor:
-        """(B, T, W) states and (B, T) marks of tokens to (B, T, W) states."""
-        many, tokens, width = hidden.shape
-        projected = self.parts["project"](hidden).view(many, tokens, 3, HEADS, -1).permute(2, 0, 3, 1, 4)
-        mixed = F.scaled_dot_product_attention(*projected.unbind(), attn_mask=real[:, None, None, :])
-        attended = self.parts["attended"](mixed.transpose(1, 2).reshape(many, tokens, width))
-        hidden = F.layer_norm(hidden + self.drop(attended), (width,), *self._norms[0], EPS)
-        outer = self.parts["outer"](F.gelu(self.parts["inner"](hidden)))
-        return F.layer_norm(hidden + self.drop(outer), (width,), *self._norms[1], EPS)
-
-
 class _Network(nn.Module):
     """The updated layers, and heads that say where movements begin and what spans of tokens ask for."""
 
     def __init__(self, weights: Mapping[str, Tensor], classes: int) -> None:
         super().__init__()
-        self.layers = nn.ModuleList(_Layer(weights, LAYERS - UPDATED + number) for number in range(UPDATED))
+        self.layers = UpdatedLayers(weights, UPDATED)
         self.drop = nn.Dropout(HEAD_DROPOUT)
         self.begins, self.asks = nn.Linear(WIDTH, 2), nn.Linear(WIDTH, classes)
         self.hidden, self.out = nn.Linear(WIDTH + classes + 2, UNITS), nn.Linear(UNITS, classes)
 
     def forward(self, states: Tensor, real: Tensor) -> Tensor:
         """(B, T, W) states below, and (B, T) marks of tokens, to (B, T, W) states."""
-        for layer in self.layers:
-            states = layer(states, real)
-        return states
+        return self.layers(states, real)
 
     def spans(self, means: Tensor, marks: Tensor) -> Tensor:
         """(N, W) mean states of spans and (N, M) marks of their words to (N, C) classes."""
@@ -166,7 +111,7 @@ def train(texts: Sequence[PartedText], encoder: MiniLM, weights: Mapping[str, Te
             nn.utils.clip_grad_norm_(network.parameters(), CLIPPED)
             optimizer.step()
             schedule.step()
-    return _updates(network)
+    return network.layers.updates()
 
 
 def _text(text: PartedText, encoder: MiniLM, classes: Sequence[str]) -> _Text:
@@ -212,16 +157,6 @@ def _loss(network: _Network, batch: Sequence[_Text], shares: Mapping[int, float]
     losses = F.cross_entropy(asked, wanted, reduction="none", label_smoothing=SMOOTHING)
     cuts = cut_loss(network.begins(network.drop(states)), network.asks(network.drop(states)), tokens, 0.5)
     return (losses * weights).sum() / weights.sum() + CUT_WEIGHT * cuts
-
-
-def _updates(network: _Network) -> dict[str, Tensor]:
-    found: dict[str, Tensor] = {}
-    for number, layer in enumerate(network.layers, LAYERS - UPDATED):
-        assert isinstance(layer, _Layer)
-        for name, part in layer.parts.items():
-            assert isinstance(part, _Linear)
-            found |= {f"{number}.{name}.down": part.downs, f"{number}.{name}.up": part.up()}
-    return found
 
 
 def main() -> None:

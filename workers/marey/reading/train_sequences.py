@@ -8,6 +8,7 @@ from __future__ import annotations
 import random
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -23,11 +24,14 @@ from marey.reading.sequences import PartedText, parted_texts
 from marey.referee.prompts import development_prompts
 from marey.text.action_reader import OUTSIDE
 from marey.text.clause_order import CONTEXT, without_joints
-from marey.text.encoders import Encoding
+from marey.text.encoders import Encoding, find_encoder
 from marey.text.minilm_encoder import MiniLMEncoder
+from marey.text.order_reader import FILE as ORDER_FILE
+from marey.text.order_reader import order_reader
 from marey.text.parsed import without_punctuation
 from marey.text.reader_file import Float32
-from marey.text.sequence_reader import FILE, KERNEL, STATE_SCALE, SequenceReader, clause_inputs
+from marey.text.reading_encoder import reading_encoder
+from marey.text.sequence_reader import FILE, KERNEL, STATE_SCALE, ReadMovement, SequenceReader, clause_inputs
 from marey.vocabulary.bearing_words import as_written
 from marey.vocabulary.entries import load_vocabulary
 
@@ -224,16 +228,20 @@ def main() -> None:
 
 def _rates(reader: SequenceReader, encoder: MiniLMEncoder) -> str:
     """Return how many held-out sequences are read right, and how many other prompts are taken for some."""
-    lines: list[str] = []
-    read = {text: reader.read(as_written(text), encoder.encode(text), encoder.pooled) for text, _ in sequence_prompts()}
-    right = sum([each.action for each in read[text]] == list(actions) for text, actions in sequence_prompts())
-    lines.append(f"sequences: {right} of {len(read)} right\n")
+
+    def read(text: str) -> tuple[ReadMovement, ...]:
+        return reader.read(as_written(text), encoder.encode(text), encoder.pooled, in_time)
+
+    by_order = reading_encoder(MiniLMEncoder(find_encoder("minilm")), ORDER_FILE)
+    in_time = partial(order_reader().order, encode=by_order.encode)
+    right = sum([each.action for each in read(text)] == list(actions) for text, actions in sequence_prompts())
+    lines = [f"sequences: {right} of {len(sequence_prompts())} right\n"]
     others = {
         "one action": [prompt.text for prompt in development_prompts()],
         "outside": list(outside_prompts()),
     }
     for kind, prompts in others.items():
-        taken = sum(bool(reader.read(as_written(text), encoder.encode(text), encoder.pooled)) for text in prompts)
+        taken = sum(bool(read(text)) for text in prompts)
         lines.append(f"{kind}: {taken} of {len(prompts)} read as a sequence\n")
     return "".join(lines)
 
