@@ -22,8 +22,8 @@ _PAUSE = (
     r"(?:moment|while|pause|beat|bit|second|time)s?"
 )
 _JOINING = re.compile(
-    r"^(?:[\s,.;:+/>→\-–—&(]+|(?:and|then|next|finally|afterwards?|first|before"
-    rf"|after(?: (?:that|this|{_PAUSE}))?|until|once|while|as|followed by|but|having|ending with)\b\s*)+",
+    r"^(?:[\s,.;:+/>→\-–—&(]+|(?:and|then|next|finally|afterwards?|first|(?:only |not )?(?:before|until|once)|prior to"
+    rf"|(?:only )?after(?: (?:that|this|{_PAUSE}))?|while|as|followed by|but|having|ending with)\b\s*)+",
     re.IGNORECASE,
 )
 """Words and signs at the beginning of a clause that join it to others."""
