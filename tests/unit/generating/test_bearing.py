@@ -369,9 +369,12 @@ def test_who_skips_leaves_the_floor_in_every_step() -> None:
     after = skipping(joints, LAYOUT, 0, len(joints), "", np.random.default_rng(1))
     lowest, before = (each[:, [7, 8, 10, 11], 1].min(1) for each in (after, joints))
     assert before.max() < 0.06
-    assert lowest.max() > 0.1
-    up = lowest > 0.08
+    assert lowest.max() > 0.08
+    up = lowest > 0.065
     assert np.sum(up[1:] & ~up[:-1]) >= 6
+    falls = np.diff(after[:, PELVIS, 1], 2) * FPS**2
+    assert -12.0 < falls.min() < -8.0, "it falls freely"
+    assert falls.max() < 24.0, "its legs take up the fall"
 
 
 def test_a_foot_taps_where_the_body_stands() -> None:

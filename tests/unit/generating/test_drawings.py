@@ -13,7 +13,8 @@ from marey.drawing.kinds import DRAWINGS
 from marey.generation.drawn_whole import drawn_whole
 from marey.generation.fine_wish import FineWish
 from marey.motion.features import HUMANML3D_263
-from marey.posing.limbs import BONE_LENGTHS, PARENTS
+from marey.motion.support import clearance
+from marey.posing.limbs import BONE_LENGTHS, GRAVITY, PARENTS
 from marey.quality.record import SHOWN
 from marey.selector.motion import Motion
 from marey.selector.rules import RULES
@@ -35,6 +36,49 @@ def test_a_movement_shows_its_action_on_a_body_of_fixed_bones(action: str) -> No
     np.testing.assert_allclose(lengths, np.broadcast_to(BONE_LENGTHS[1:], lengths.shape), atol=2e-3)
     assert np.linalg.norm(np.diff(joints, axis=0), axis=-1).max() < 0.6
     assert joints[..., 1].min() > -0.02
+
+
+@pytest.mark.parametrize("action", ["throw", "slash"])
+@pytest.mark.parametrize("seed", range(4))
+def test_no_elbow_whips_around_a_wrist_that_hardly_moves(action: str, seed: int) -> None:
+    joints = drawn(action, seed)
+    for shoulder, elbow, wrist in ((16, 18, 20), (17, 19, 21)):
+        limb = joints[:, [elbow, wrist]] - joints[:, [shoulder]]
+        elbows, wrists = np.linalg.norm(np.diff(limb, axis=0), axis=-1).T
+        assert (elbows - wrists).max() < 0.12
+
+
+@pytest.mark.parametrize("action", ["jump", "jump-forward"])
+@pytest.mark.parametrize("seed", range(4))
+def test_the_arms_of_a_jump_swing_up_past_the_hips(action: str, seed: int) -> None:
+    joints = drawn(action, seed)
+    elbows = joints[:, [18, 19]] - joints[:, [16, 17]]
+    assert np.linalg.norm(np.diff(elbows, axis=0), axis=-1).max() < 0.2
+
+
+@pytest.mark.parametrize("action", ["squat", "pick-up"])
+@pytest.mark.parametrize("seed", range(4))
+def test_legs_carry_the_hips_no_faster_than_they_can(action: str, seed: int) -> None:
+    hips = drawn(action, seed)[:, 0, 1]
+    assert np.abs(np.diff(hips)).max() * LAYOUT.fps < 1.3
+    assert np.diff(hips, 2).min() * LAYOUT.fps**2 > -GRAVITY, "feet that stand do not pull"
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_crawl_goes_on_its_knees_not_through_the_floor(seed: int) -> None:
+    joints = drawn("crawl", seed)
+    assert joints[:, [4, 5], 1].min() > 0.04
+    assert clearance(joints).min() > -0.02
+    way = np.linalg.norm(np.diff(joints[:, 0, [0, 2]], axis=0), axis=-1)
+    assert way.mean() * LAYOUT.fps > 0.3
+
+
+@pytest.mark.parametrize("prompt", ["someone aims a rifle", "takes aim"])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_gun_is_raised_before_it_is_aimed(prompt: str, seed: int) -> None:
+    wrists = drawn("aim", seed, prompt)[:, [20, 21], 1]
+    assert wrists[0].max() < 1.0
+    assert np.ptp(wrists, axis=0).max() > 0.3
 
 
 @pytest.mark.parametrize("side", ["left", "right"])

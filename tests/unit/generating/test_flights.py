@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from marey.generation.flights import LONGER, UP_M, fallen, on_floor
+from marey.generation.flights import LONGER, UP_M, fallen, lowered, on_floor
 from marey.motion.features import HUMANML3D_263
 from marey.posing.limbs import GRAVITY
 from tests.support.bodies import Body, walker
@@ -52,6 +52,17 @@ def test_a_flight_that_falls_stays() -> None:
     height = 0.3
     assert fallen(features(jumper(height, 2 * np.sqrt(2 * height / GRAVITY))), LAYOUT) is None
     assert fallen(features(walker()), LAYOUT) is None
+
+
+def test_a_dance_that_hangs_in_the_air_stands_meanwhile_and_its_jumps_stay() -> None:
+    hangs = jumper(0.15, 0.7)
+    stands = lowered(features(hangs), LAYOUT)
+    assert stands is not None
+    assert len(stands) == len(features(hangs)), "the time of a dance is kept"
+    assert seconds_up(stands) == 0.0
+    assert lowest(stands).min() > -0.01
+    assert lowered(features(jumper(0.3, 2 * np.sqrt(2 * 0.3 / GRAVITY))), LAYOUT) is None
+    assert make(hangs, ask("a person dances")).changes["grounded"]
 
 
 def test_a_motion_that_begins_in_the_air_begins_as_it_lands() -> None:

@@ -33,3 +33,11 @@ def test_a_body_stands_on_the_floor_breathes_and_keeps_its_feet(seed: int) -> No
 def test_bodies_differ_from_seed_to_seed() -> None:
     first, second = (standing_still(20, random.Random(seed)) for seed in (1, 2))
     assert np.abs(first - second).max() > 0.02
+
+
+def test_the_arms_of_a_body_that_waits_are_not_rigid() -> None:
+    joints = standing_still(160, random.Random(1))
+    for shoulder, elbow, wrist in ((16, 18, 20), (17, 19, 21)):
+        upper, fore = (joints[:, b] - joints[:, a] for a, b in ((shoulder, elbow), (elbow, wrist)))
+        cosine = (upper * fore).sum(-1) / np.linalg.norm(upper, axis=-1) / np.linalg.norm(fore, axis=-1)
+        assert 1.5 < np.ptp(np.degrees(np.arccos(cosine))) < 12.0

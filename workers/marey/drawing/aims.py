@@ -23,7 +23,7 @@ def aim(rng: random.Random) -> Gesture:
         seconds, kinds = rng.uniform(2.0, 7.0), ("aim", form)
         pace = GesturePace.lasting(seconds)
     else:
-        pace = GesturePace.draw(rng, (0.3, 0.9), (1.5, 4.5))
+        pace = GesturePace.draw(rng, (0.3, 0.9), (0.8, 4.0))
         seconds, kinds = pace.total(rng), ("aim", form, "aim-raise")
     hands, twist, head = GUNS[form](rng, side), TWISTS[form], rng.uniform(0, 7)
     degrees, turned = rng.uniform(*twist), OTHER_SIDE[side] if form == "aim-rifle" else side

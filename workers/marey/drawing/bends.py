@@ -47,8 +47,8 @@ def squat(rng: random.Random, *, times: int | None = None) -> Gesture:
     hold = rng.uniform(0.8, 2.5) if times == 1 and rng.random() < 0.3 else rng.uniform(0.0, 0.35)
     for k in range(times):
         low = replace(down, pelvis=(0.0, height + rng.uniform(-0.03, 0.03) * (k > 0), -back))
-        done.then(fall * rng.uniform(0.9, 1.1), low, hold)
-        done.then(fall * rng.uniform(0.8, 1.1), up, rng.uniform(0.02, 0.25))
+        done.carried(fall * rng.uniform(0.9, 1.1), low, hold)
+        done.carried(fall * rng.uniform(0.8, 1.1), up, rng.uniform(0.02, 0.25))
     if keep:
         if form == "squat-head":
             done.then(rng.uniform(0.35, 0.5), past)
@@ -127,13 +127,13 @@ def pick_up(rng: random.Random) -> Gesture:
     action = rng.choices(["pick-up", "pick-put", "pick-drop"], (6, 3, 2))[0]
     if action == "pick-put":
         done.then(rng.uniform(0.4, 0.7), holding, rng.uniform(0.2, 0.8))
-    done.then(fall, low, rng.uniform(0.15, 0.5))
+    done.carried(fall, low, rng.uniform(0.15, 0.5))
     if action == "pick-put":
-        done.then(lift, STAND)
+        done.carried(lift, STAND)
     elif action == "pick-up":
-        done.then(lift, holding, rng.uniform(0.4, 1.8))
+        done.carried(lift, holding, rng.uniform(0.4, 1.8))
     if action == "pick-drop":
-        done.then(lift, STAND)
+        done.carried(lift, STAND)
     if action == "pick-up" and rng.random() < 0.4:
         done.then(rng.uniform(0.5, 0.8), STAND)
     kinds = (

@@ -15,11 +15,13 @@ from marey.posing.standing import OTHER_SIDE, SIGN
 _PELVIS = 0.47
 """Metres of the hips over the floor: a thigh over a knee that lies on it."""
 _SHANK = 0.4
-_TILT = 78.0
+_ANKLE, _FOOT = 0.075, (0.0, -0.45, -0.89)
+"""Metres of an ankle over the floor, and where the foot behind it points: the toes lie on it, lower than the knees."""
+_TILT = 83.0
 """Degrees by which the hips are tilted; the trunk is about level."""
 _SHOULDERS = 0.47
 """Metres of the shoulders ahead of the hips."""
-_PACES = {"slow": (1.5, 2.1), "": (1.0, 1.4), "quick": (0.72, 0.92)}
+_PACES = {"slow": (1.5, 2.1), "": (0.95, 1.25), "quick": (0.72, 0.92)}
 """Seconds in which each limb moves once."""
 _PostureAt = Callable[[float, dict[str, float], dict[str, float], str], Posture]
 _LIFT = 0.07
@@ -29,7 +31,7 @@ _LIFT = 0.07
 def on_fours(rng: random.Random) -> Posture:
     """On hands and knees, about where a crawl ends."""
     hand = HandPlace((rng.uniform(0.15, 0.22), 0.05, _SHOULDERS + 0.04), "floor", (0.6, 0.2, -0.8))
-    shank = FootPlace((rng.uniform(0.08, 0.13), 0.085, 0.02 - _SHANK), (0.0, -0.3, -0.95))
+    shank = FootPlace((rng.uniform(0.08, 0.13), _ANKLE, 0.02 - _SHANK), _FOOT)
     posture = Posture((0.0, _PELVIS, 0.0), (_TILT, 0, 0), (0, 0, 0), (rng.uniform(-36, -16), 0, 0))
     poles: Point = (0.1, -0.8, 0.6)
     return replace(
@@ -50,16 +52,16 @@ def crawl(
     """
     tempo = rng.choice(["slow", "", "", "quick"])
     period = rng.uniform(*_PACES[tempo])
-    stride = rng.uniform(0.2, 0.34) if tempo != "slow" else rng.uniform(0.16, 0.26)
+    stride = rng.uniform(0.42, 0.52) if tempo != "slow" else rng.uniform(0.3, 0.42)
     back = rng.random() < 0.15 if back is None else back
     if back:
-        stride = -0.8 * stride
+        stride = -0.7 * stride
     cycles = max(2, round(seconds / period) if seconds else min(round(rng.uniform(2.6, 7.4) / period), 8))
     cycles, stride = _over(metres, cycles, stride)
     wide, knees = rng.uniform(0.15, 0.22), rng.uniform(0.08, 0.13)
     look, sway, round_back = rng.uniform(-42, -12), rng.uniform(2, 6), rng.uniform(-4, 8)
     elbow: Point = (rng.uniform(0.4, 0.9), 0.2, -0.8)
-    pelvis = _PELVIS - rng.uniform(0.0, 0.03)
+    pelvis = _PELVIS - rng.uniform(0.0, 0.01)
 
     def at(body: float, hands: dict[str, float], feet: dict[str, float], lifted: str) -> Posture:
         """A body with its hips at a place along the way, and each limb at its own; `lifted`: the side of the hand in
@@ -71,7 +73,7 @@ def crawl(
             for side in SIDES
         }
         shanks = {
-            side: FootPlace((knees, 0.085 + 0.02 * (side == other), feet[side] - _SHANK + 0.02), (0.0, -0.3, -0.95))
+            side: FootPlace((knees, _ANKLE + 0.02 * (side == other), feet[side] - _SHANK + 0.02), _FOOT)
             for side in SIDES
         }
         posture = Posture(

@@ -136,11 +136,17 @@ class _Hops:
 _REACH = HandPlace((0.16, 0.42, 0.14), "shoulder", (0.8, 0.2, 0.2))
 _SWUNG = {
     "back": HandPlace((0.2, -0.36, -0.26), "shoulder", (0.4, -0.2, -0.9)),
+    "low": HandPlace((0.18, -0.42, 0.18), "shoulder", (0.6, -0.2, -0.8)),
     "bent": HandPlace((0.12, -0.24, 0.26), "shoulder", (0.6, -0.6, -0.6)),
     "ahead": HandPlace((0.1, 0.04, 0.46), "shoulder", (0.6, -0.7, 0.0)),
     "up": _REACH,
     "side": HandPlace((0.44, -0.04, 0.12), "shoulder", (0.1, -0.9, -0.4)),
 }
+
+
+_SWING_S = 0.14
+"""Seconds in which hands that were swung back come past the hips; straight up from there they would pass the shoulder,
+about which the elbow would whip."""
 
 
 def jump(rng: random.Random, *, times: int | None = None) -> Gesture:
@@ -321,6 +327,8 @@ class _Jumps:
             toes = _tiptoe(feet, pointed, where, up + drawn)
             return self._at(0.95 + up, where, toes, hands, lean * (1 - share), 4 + 40 * drawn)
 
+        if self.back == "back":
+            done.then(_SWING_S, replace(self._crouched(here, _flat(feet, here), 0.6), hands=both(_SWUNG["low"])))
         done.then(self.rise, leaving)
         fly(done, self.flight, leaving, landing, shaped)
 

@@ -62,7 +62,7 @@ def kneel(rng: random.Random) -> Gesture:
             done.then(0.75 * pace, low if not heels else replace(low, pelvis=half.pelvis))
         if heels:
             done.then(0.5 * pace, low)
-    end = done.times[-1] + rng.uniform(1.2, 3.2)
+    end = done.times[-1] + rng.uniform(0.9, 2.0)
     while done.times[-1] < end:
         spine, neck = (lean + rng.uniform(-4, 6), rng.uniform(-2, 2), rng.uniform(-6, 6)), (rng.uniform(-6, 16), 0, 0)
         done.then(rng.uniform(0.6, 1.1), replace(low, spine=spine, neck=neck), rng.uniform(0.1, 0.6))

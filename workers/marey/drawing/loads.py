@@ -35,7 +35,7 @@ def lift(rng: random.Random, *, heavy: bool = False) -> Gesture:
     def sequel(feet: _Feet) -> Sequel:
         down, half, held = _stages(feet)
         done = Sequel([starts])
-        done.then(0.85 * pace, down, 0.25 * pace)
+        done.carried(0.85 * pace, down, 0.25 * pace)
         done.then(0.5 * pace, half)
         done.then(0.5 * pace, held, 0.4)
         return done
@@ -69,7 +69,7 @@ def put_down(rng: random.Random, onto: str = "floor", *, drops: bool = False) ->
             done.then(0.25, replace(down, hands=_OPENED_BELOW), 0.1)
         else:
             done = _onto(done, onto, pace)
-        done.then(0.85 * pace, Posture((0.0, 0.94, 0.0), feet={side: foot.flat() for side, foot in feet.items()}))
+        done.carried(0.85 * pace, Posture((0.0, 0.94, 0.0), feet={side: foot.flat() for side, foot in feet.items()}))
         return done
 
     return on_feet(sequel, ["pick-put", "load-put"], rng.uniform(0.4, 0.7))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -16,6 +17,12 @@ FLOOR_PACES = {"quick": (0.7, 0.85), "": (0.95, 1.25), "slow": (1.4, 1.8)}
 """Factors of the seconds of a way to the floor or back."""
 
 
+_HIPS_UP = 0.94
+"""Metres of the hips of a body that stands."""
+_LEGS_CARRY = 1.15
+"""Metres a second at which legs that stay on the floor move the hips at most, in the middle of a way."""
+_FASTEST = 1.5
+"""How many times its mean speed a body has in the middle of a way between two stops."""
 Step = tuple[float, Posture]
 """Seconds in which a posture is reached, and the posture."""
 
@@ -34,6 +41,11 @@ class Sequel:
         if hold > 0.0:
             self.times.append(self.times[-1] + hold)
             self.postures.append(posture)
+
+    def carried(self, seconds: float, posture: Posture, hold: float = 0.0) -> None:
+        """Reach a posture as by `then`, but no faster than legs carry hips that start and stop."""
+        here, there = (each.pelvis or (0.0, _HIPS_UP, 0.0) for each in (self.postures[-1], posture))
+        self.then(max(seconds, _FASTEST * math.dist(here, there) / _LEGS_CARRY), posture, hold)
 
     def mirrored(self) -> Sequel:
         """The same with left and right exchanged."""

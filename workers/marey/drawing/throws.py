@@ -29,6 +29,8 @@ _TRUNK = {
     "throw-both": {"twist": (0, 0), "back": (10, 22), "stoop": (14, 34), "sway": (0, 0)},
 }
 """Degrees of the trunk: turned away, leant back, bent forward and leant aside."""
+_PAST_SHOULDER = [0.14, 0.0, 0.04]
+"""Metres outward, up and forward by which a hand drawn back keeps clear of the shoulder, where the elbow would fold."""
 
 
 def throw(rng: random.Random) -> Gesture:
@@ -43,7 +45,7 @@ def throw(rng: random.Random) -> Gesture:
     phases = _Phases(rng, snap)
     chest = np.array([rng.uniform(0.04, 0.14), rng.uniform(-0.28, -0.12), rng.uniform(0.22, 0.32)])
     places = [np.array(place) + [rng.gauss(0, 0.025) for _ in range(3)] for place in _THROWS[form]]
-    lifted = [0.15, 0.24, 0.24] if side == BOTH else 0.5 * (chest + places[0]) + [0.06, 0.0, 0.0]
+    lifted = [0.15, 0.24, 0.24] if side == BOTH else 0.5 * (chest + places[0]) + _PAST_SHOULDER
     points = [chest, chest, lifted, places[0], places[0] + [0.0, 0.0, -0.03], *places[1:]]
     gathers, counters = rng.random() < 0.5, rng.random() < 0.65
     returns = rng.random() < 0.7

@@ -23,7 +23,7 @@ from marey.generation.ends import ended
 from marey.generation.even_runs import EVEN, even_run
 from marey.generation.fine import FINE, drawn_features
 from marey.generation.fine_wish import FineWish
-from marey.generation.flights import JUMPS, ON_FEET, fallen, on_floor
+from marey.generation.flights import DANCES, JUMPS, ON_FEET, fallen, lowered, on_floor
 from marey.generation.footing import RUNS, footed
 from marey.generation.gazing import GAZE
 from marey.generation.onward import without_return
@@ -473,6 +473,8 @@ def _on_floor(
         features, changes["footed"] = held, True
     if wish.action in ON_FEET and (grounded := on_floor(features, layout, wish.action)) is not None:
         features, changes["grounded"] = grounded, True
+    if wish.action in DANCES and (stands := lowered(features, layout)) is not None:
+        features, changes["grounded"] = stands, True
     if wish.action in JUMPS and fixed is None:
         falls = fallen(features, layout)
         if falls is not None and len(falls) >= SHORTEST:

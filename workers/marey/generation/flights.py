@@ -25,6 +25,8 @@ JUMPS = frozenset({"jump", "jump-forward", "leap", "hop", "jump-turn"})
 """Actions whose flights are looked at."""
 ON_FEET = JUMPS | {"walk", "walk-backward", "run", "sprint", "turn", "sidestep", "jumping-jacks"}
 """Actions on the floor."""
+DANCES = frozenset({"dance"})
+"""Actions whose flights keep their time, and come down where they hang in the air."""
 ANKLES, TOES, ANKLE_M = [7, 8], [10, 11], 0.06
 """Joints, and metres of an ankle over the sole."""
 UP_M = 0.04
@@ -58,8 +60,7 @@ def fallen(features: Float32, layout: FeatureLayout) -> Float32 | None:
         begins = 0
     rate = np.ones(len(joints))
     for begin, end in flights:
-        falls = 2 * np.sqrt(2 * (low[begin:end].max() - UP_M) / GRAVITY) * LONGER * fps
-        rate[begin:end] = np.clip((end - begin) / max(falls, 1.0), 1.0, FASTEST)
+        rate[begin:end] = np.clip((end - begin) / _longest(low[begin:end], fps), 1.0, FASTEST)
     if not begins and rate.max() <= 1.0:
         return None
     joints, rate = joints[begins:], smooth(rate, PASSES_S, fps)[begins:]
@@ -88,6 +89,31 @@ def on_floor(features: Float32, layout: FeatureLayout, action: str = "") -> Floa
         return None
     joints[..., 1] -= np.maximum(drift, 0.0)[:, None]
     return encode_all(layout, joints)
+
+
+def lowered(features: Float32, layout: FeatureLayout) -> Float32 | None:
+    """Return features (T, D) of a body that stands where it hung in the air, longer than a jump of that height lasts;
+    None if it does not hang.
+
+    Args:
+        features: (T, D), in the layout's own units, on the skeleton of HumanML3D.
+        layout: of the features.
+    """
+    joints, fps = layout.decode(features).astype(np.float64), layout.fps
+    low = lowest_foot(joints)
+    hangs = np.zeros(len(joints))
+    for begin, end in runs(low > UP_M):
+        if end - begin > max(_longest(low[begin:end], fps), LEAST_S * fps):
+            hangs[begin:end] = 1.0
+    if not hangs.any():
+        return None
+    joints[..., 1] -= (smooth(hangs, PASSES_S, fps) * np.maximum(low, 0.0))[:, None]
+    return encode_all(layout, joints)
+
+
+def _longest(low: Array, fps: float) -> float:
+    """Return frames that a flight lasts at most whose feet are at so many metres (T,)."""
+    return float(max(2 * np.sqrt(2 * (low.max() - UP_M) / GRAVITY) * LONGER * fps, 1.0))
 
 
 def lowest_foot(joints: Array) -> Array:

@@ -19,7 +19,7 @@ from marey.generation.turned import bent_along
 from marey.motion.courses import natural_course
 from marey.motion.features import FeatureLayout
 from marey.motion.skeleton import HUMANML3D
-from marey.posing.limbs import BONE_LENGTHS
+from marey.posing.limbs import BONE_LENGTHS, GRAVITY
 from marey.posing.standing import LEFT, LEGS, OTHER_SIDE, RIGHT, StandingBody, eased
 from marey.vocabulary.bearings import Gait
 
@@ -69,8 +69,9 @@ LIFTS_S = 0.07
 """Standard deviation of the filter by which a knee comes up, seconds."""
 UP_FIRST = 1.5
 """By how much a foot rises before it goes ahead: it would slide."""
-HOPS, HOP_FROM = 0.12, 0.6
-"""Metres by which who skips leaves the floor, and the share of the lift of the other knee from which on."""
+HOP_AIR, HOP_FROM, LANDS_S = 0.55, 0.6, 0.1
+"""Share of each step of who skips that it is in the air, the share of the lift of the other knee from which on a step
+is one, and seconds in which it sinks before its first hop and after the last one."""
 STILL = 0.15
 """Metres a second of the hips, under which a body stands."""
 SHIFTS, SHIFTS_HZ, SHIFTS_RESTS = 0.075, (0.17, 0.24), 1.8
@@ -151,14 +152,44 @@ def with_high_knees(
     """Return joints (T, 22, 3) of a walk that lifts its knees high in the frames `begin` to `end`; see `limping`."""
     del side, rng  # both knees, all the same
     lifts = _lifts(joints, layout.fps, _inside(len(joints), begin, end, layout.fps))
-    return _knees_lifted(joints, lifts, KNEE_UP, 0.0)
+    return _knees_lifted(joints, lifts, KNEE_UP)
 
 
 def skipping(joints: Array, layout: FeatureLayout, begin: int, end: int, side: str, rng: np.random.Generator) -> Array:
     """Return joints (T, 22, 3) of a walk, of which the frames `begin` to `end` skip; see `limping`."""
     del side, rng
     lifts = _lifts(joints, layout.fps, _inside(len(joints), begin, end, layout.fps))
-    return _knees_lifted(joints, lifts, KNEE_SKIPS, HOPS)
+    body = StandingBody(_knees_lifted(joints, lifts, KNEE_SKIPS))
+    up, sinks = _hops(np.maximum(*lifts.values()), layout.fps)
+    body.joints[:, :, 1] += up[:, None]
+    body.shift(-sinks)
+    return body.solved()
+
+
+def _hops(lift: Array, fps: float) -> tuple[Array, Array]:
+    """Metres (T,) by which a body rises that hops each time a knee is lifted most, and by which its hips sink between.
+
+    It rises and falls freely, and its legs take up the speed of the fall until they push off for the next hop.
+
+    Args:
+        lift: 0 to 1 (T,) of the knee that is lifted more.
+        fps: frames a second.
+    """
+    time, up, sinks = np.arange(len(lift)) / fps, np.zeros(len(lift)), np.zeros(len(lift))
+    tops = 1 + np.flatnonzero((lift[1:-1] > lift[:-2]) & (lift[1:-1] >= lift[2:]) & (lift[1:-1] > HOP_FROM))
+    if len(tops) < 2:
+        return up, sinks
+    air = HOP_AIR * float(np.median(np.diff(tops))) / fps
+    leaves, lands, speed = tops / fps - 0.5 * air, tops / fps + 0.5 * air, 0.5 * GRAVITY * air
+    for begin in leaves:
+        flies = np.clip((time - begin) / air, 0.0, 1.0)
+        up += 0.5 * GRAVITY * air**2 * flies * (1.0 - flies)
+    for begin, end in zip(lands[:-1], leaves[1:], strict=True):
+        if end > begin:
+            sinks += speed * (end - begin) / np.pi * np.sin(np.pi * np.clip((time - begin) / (end - begin), 0.0, 1.0))
+    for away in (leaves[0] - time, time - lands[-1]):
+        sinks += speed * np.maximum(away, 0.0) * np.exp(-np.maximum(away, 0.0) / LANDS_S)
+    return up, sinks
 
 
 def stomping(
@@ -186,7 +217,7 @@ def stomping(
     for each in [side] if side in LEGS else LEGS:
         its = (rounds.astype(int) % 2 == list(LEGS).index(each)) | (side in LEGS)
         lifts[each] = lifts[each] + (1.0 - goes) * stamps * its * np.sin(np.pi * np.minimum(rounds % 1.0 / 0.6, 1.0))
-    body = StandingBody(_knees_lifted(joints, lifts, KNEE_STOMPS, 0.0))
+    body = StandingBody(_knees_lifted(joints, lifts, KNEE_STOMPS))
     falls = np.maximum(*(-np.gradient(lift) * fps * STOMP_FALLS_S for lift in lifts.values()))
     body.shift(-STOMPS * inside * np.clip(smooth(falls, 0.05, fps), 0.0, 1.0))
     return body.solved()
@@ -254,11 +285,10 @@ def _lifts(joints: Array, fps: float, inside: Array) -> dict[str, Array]:
     return {side: inside * smooth(_stands(body, OTHER_SIDE[side], fps), LIFTS_S, fps) for side in LEGS}
 
 
-def _knees_lifted(joints: Array, lifts: Mapping[str, Array], degrees: float, hops: float) -> Array:
-    """Return joints (T, 22, 3) with thighs that are lifted by `degrees` in each step, and hops of so many metres."""
+def _knees_lifted(joints: Array, lifts: Mapping[str, Array], degrees: float) -> Array:
+    """Return joints (T, 22, 3) with thighs that are lifted by `degrees` in each step."""
     body = StandingBody(joints)
     thigh, shank = np.radians(degrees), np.radians(SHANK_BACK)
-    up = np.zeros(len(joints))
     for side, (hip, knee, ankle, toe) in LEGS.items():
         lifted = lifts[side]
         share = np.stack([lifted**2, eased(UP_FIRST * lifted), lifted**2], axis=-1)
@@ -268,8 +298,6 @@ def _knees_lifted(joints: Array, lifts: Mapping[str, Array], degrees: float, hop
             wanted = np.tile(place + np.array([APART, 0.0, 0.0]), (len(joints), 1))
             away = body.joints[:, hip] + body.world(wanted, side) - body.joints[:, moved[0]]
             body.joints[:, moved] += (share * away)[:, None]
-        up = np.maximum(up, lifted)
-    body.joints[:, :, 1] += hops * eased((up - HOP_FROM) / (1.0 - HOP_FROM))[:, None]
     return body.solved()
 
 

@@ -5,12 +5,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.motion.rotations import cross, normalize
+from marey.motion.rotations import between, cross, from_rotvec, normalize, rotate
+from marey.posing.curves import blurred
 from marey.posing.limbs import BONE_LENGTHS, CARRIED, LEG_CHAINS, PARENTS
 
 Array = NDArray[np.floating]
 
 _MAX_REACH = 0.9995  # a fully stretched leg has no knee plane
+_PLANE_TURN = 30.0  # degrees a frame by which the plane of a limb turns about its line at most
+_UNSURE = 0.02  # weight of a pole that lies on the line
+_WIDER, _WIDEST = 1.25, 20.0  # factor of the widths, in frames, that are tried to slow such a plane, and the last one
 
 
 def two_bones(hip: Array, ankle: Array, pole: Array, lengths: tuple[float, float]) -> tuple[Array, Array]:
@@ -20,10 +24,42 @@ def two_bones(hip: Array, ankle: Array, pole: Array, lengths: tuple[float, float
     distance = np.linalg.norm(line, axis=-1, keepdims=True)
     axis = line / distance
     distance = np.clip(distance, abs(upper - lower) + 1e-3, (upper + lower) * _MAX_REACH)
-    pole = normalize(pole - axis * np.einsum("ti,ti->t", pole, axis)[:, None])
+    pole = steady_bends(axis, pole)
     along = (distance**2 + upper**2 - lower**2) / (2 * distance)
     aside = np.sqrt(np.maximum(upper**2 - along**2, 0.0))
     return hip + along * axis + aside * pole, hip + distance * axis
+
+
+def steady_bends(axis: Array, pole: Array) -> Array:
+    """Unit vectors (T, 3) across the line of a limb towards `pole`, which turn about the line no faster than a joint.
+
+    Where the line passes by the pole, the direction across it turns around within a frame, and the elbow with it; there
+    the angle about the line is blurred, by the least width that slows it, and little where the pole is far from the
+    line. Everything else stays as it is.
+
+    Args:
+        axis: (T, 3) unit vectors from the shoulder or hip to the wrist or ankle.
+        pole: (T, 3) where the elbow or knee points.
+    """
+    aside = pole - axis * np.einsum("ti,ti->t", pole, axis)[:, None]
+    bends = normalize(aside).astype(np.float64)
+    turns = _turns(axis, bends)
+    if not np.any(np.abs(turns) > np.radians(_PLANE_TURN)):
+        return bends
+    angles = np.concatenate([[0.0], np.cumsum(turns)])
+    sure = np.einsum("ti,ti->t", aside, aside) + _UNSURE
+    steady, width = angles, 1.0
+    while np.abs(np.diff(steady)).max() > np.radians(_PLANE_TURN) and width < _WIDEST:
+        total, weight = blurred(np.stack([sure * angles, sure], axis=1), width).T
+        steady, width = total / weight, _WIDER * width
+    return rotate(from_rotvec(axis * (steady - angles)[:, None]), bends)
+
+
+def _turns(axis: Array, bends: Array) -> Array:
+    """Radians (T - 1,) about the line by which the direction across it turns, apart from how the line turns."""
+    carried = rotate(between(axis[:-1], axis[1:]), bends[:-1])
+    sine = np.einsum("ti,ti->t", axis[1:], cross(carried, bends[1:]))
+    return np.arctan2(sine, np.einsum("ti,ti->t", carried, bends[1:]))
 
 
 def directions_of(joints: Array) -> Array:

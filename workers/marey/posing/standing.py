@@ -17,7 +17,7 @@ from marey.checks.kinematics import heading
 from marey.motion.filters import smootherstep
 from marey.motion.rotations import from_rotvec, normalize, rotate
 from marey.motion.skeleton import HUMANML3D
-from marey.posing.bones import with_bones
+from marey.posing.bones import steady_bends, with_bones
 from marey.posing.limbs import ARM_CHAINS, BONE_LENGTHS, CARRIED, FPS, LEG_CHAINS
 
 Array = NDArray[np.floating]
@@ -42,6 +42,7 @@ _HIPS_FOLLOW = 0.9  # share of the rise of the ankles; knees are not to be stret
 _DOWN = 0.03  # metres that they move down in it
 _PELVIS_SHARE = 0.45  # share of a bow by the hips; the spine bends by the rest
 _POLE = (0.7, -1.0, -0.3)  # elbows point down and outward
+_ACROSS = 1.2  # how far forward the elbow of an arm across the body points: before the chest, not through it
 _SWING_FROM = 0.7  # share of the rise after which a hand swings
 
 
@@ -166,10 +167,11 @@ class StandingBody:
         distance = np.linalg.norm(target, axis=-1, keepdims=True)
         axis = target / distance
         distance = np.clip(distance, abs(upper - lower) + 0.02, 0.98 * (upper + lower))
-        poles = np.broadcast_to(np.asarray(pole), axis.shape)
-        aside = poles - axis * (axis * poles).sum(-1, keepdims=True)
         along = (distance**2 + upper**2 - lower**2) / (2 * distance)
-        bent = along * axis + np.sqrt(np.maximum(upper**2 - along**2, 0.0)) * normalize(aside)
+        across = np.maximum(-axis[:, :1], 0.0) ** 2
+        poles = np.asarray(pole, np.float64) + _ACROSS * across * [0.0, 0.0, 1.0]
+        aside = steady_bends(axis, poles)
+        bent = along * axis + np.sqrt(np.maximum(upper**2 - along**2, 0.0)) * aside
         return normalize(bent), normalize(distance * axis - bent)
 
     def from_shoulder(self, side: str, points: Array) -> Array:

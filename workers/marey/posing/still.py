@@ -28,16 +28,20 @@ _UPPER, _FORE = ((6.0, 16.0), (-4.0, 8.0)), ((8.0, 22.0), (6.0, 18.0))
 _BREATHS_HZ, _SWAYS_HZ = (0.22, 0.3), (0.14, 0.22)
 _SWAY = {"left": 0.008, "forward": 0.006, "up": 0.0025}
 """Metres by which a body that stands sways and breathes."""
+_ARM_SWINGS = {"upper": 0.8, "fore": 2.2}
+"""Degrees by which the bones of arms that hang swing to and fro meanwhile, each arm in its own time."""
 
 
 def standing_still(frames: int, rng: random.Random) -> Array:
     """Joints (T, 22, 3) of a body that stands on the origin and faces +Z, with its breath and its sway; metres."""
     body = StandingBody(np.repeat(_upright()[None], frames, axis=0))
+    time = np.arange(frames) / FPS
     for side in ARMS:
         (out, ahead), (fore_out, fore_ahead) = ((rng.uniform(*limits) for limits in bone) for bone in (_UPPER, _FORE))
+        swing = np.sin(2 * np.pi * (rng.uniform(*_SWAYS_HZ) * time + rng.random()))
+        ahead, fore_ahead = ahead + _ARM_SWINGS["upper"] * swing, fore_ahead + _ARM_SWINGS["fore"] * swing
         ways = _hanging(out, ahead), _hanging(0.3 * fore_out, ahead + fore_ahead)
         body.move_arm(side, np.ones(frames), *ways, 0.0, straight=True)
-    time = np.arange(frames) / FPS
     breath, sway = (np.sin(2 * np.pi * (rng.uniform(*rate) * time + rng.random())) for rate in (_BREATHS_HZ, _SWAYS_HZ))
     aside = np.sin(2 * np.pi * (rng.uniform(*_SWAYS_HZ) * time + rng.random()))
     body.shift(_SWAY["up"] * (breath - 1), _SWAY["forward"] * sway, _SWAY["left"] * aside)
@@ -45,9 +49,10 @@ def standing_still(frames: int, rng: random.Random) -> Array:
     return body.solved()
 
 
-def _hanging(out: float, ahead: float) -> Array:
-    """Direction (3,) of an arm: outward, up and forward."""
-    return normalize(np.array([np.tan(np.radians(out)), -1.0, np.tan(np.radians(ahead))]))
+def _hanging(out: float, ahead: Array) -> Array:
+    """Directions (T, 3) of an arm, outward, up and forward, by degrees outward and (T,) forward."""
+    sideways, down = np.full_like(ahead, np.tan(np.radians(out))), np.full_like(ahead, -1.0)
+    return normalize(np.stack([sideways, down, np.tan(np.radians(ahead))], axis=-1))
 
 
 def _upright() -> Array:
