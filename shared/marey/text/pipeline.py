@@ -28,6 +28,7 @@ from marey.text.graph import Node, SemanticGraph, build_graph
 from marey.text.guard import changed_but_aligned, changed_meaning, lost_meaning
 from marey.text.in_place_words import with_plain_gait_in_place
 from marey.text.keys import NO_LABELLER, feature_key
+from marey.text.known_verbs import with_known_verbs
 from marey.text.labellers import OneAtATime
 from marey.text.loading import load_encoder, load_labeller, load_rewriter
 from marey.text.misleading_words import without_misleading
@@ -59,7 +60,7 @@ TOGETHER = 64
 def _in_known_words(prompt: str) -> str:
     """Return a prompt as the readers know it: in the order of time, with the words that it leaves out, without those
     that mislead them, and with plain words of ways that wind and of gaits in place."""
-    said = with_plain_phrases(without_asides(as_words(prompt)))
+    said = with_known_verbs(with_plain_phrases(without_asides(as_words(prompt))))
     ordered = with_elided(in_time_order(in_usual_order(said)))
     return without_misleading(with_plain_gait_in_place(with_plain_zigzag(ordered)))
 

@@ -7,8 +7,17 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
-from marey.vocabulary.bearings import Side, StatedBearing, bearing_macros, bearing_words, each_once
+from marey.vocabulary.bearings import (
+    UNLESS,
+    Side,
+    StatedBearing,
+    bearing_macros,
+    bearing_table,
+    bearing_words,
+    each_once,
+)
 from marey.vocabulary.counts import stated_strokes, strokes_before, strokes_behind
+from marey.vocabulary.held_poses import held_words
 from marey.vocabulary.inflection import gerund, third_person, verb_forms
 from marey.vocabulary.word_lists import load_word_lists
 
@@ -125,6 +134,8 @@ _OVER_AND_OVER = re.compile(
     r" (?:(?:from )?side to side|back and forth|up and down|to and fro|left and right|over and over(?: again)?)\b"
 )
 """Words of how work goes on, behind its own."""
+_HOLDING = re.compile(r"(?:,? and|,? then|,| -)? (?:(?:he|she|they) )?(?=hold|keep|maintain|for )")
+"""Words between those of a gesture and those that have its pose held."""
 _HANDED = re.compile(r"\b(?:left|right)[- ]handed\b")
 _PRONOUNS = frozenset(["he", "she", "they", "it", "i", "you", "we", "someone", "somebody"])
 _BRINGING = frozenset(
@@ -359,7 +370,20 @@ def _of_zombies(spans: Sequence[_Words]) -> Iterator[_Words]:
 def _matches(text: str) -> Iterator[_Words]:
     for name, kind, pattern in _patterns():
         for match in pattern.finditer(text):
-            yield from (_counted(text, each) for each in _words_of(text, name, kind, match))
+            if name in _unless() and _unless()[name].search(text):
+                break
+            yield from (_held(text, _counted(text, each)) for each in _words_of(text, name, kind, match))
+
+
+def _held(text: str, found: _Words) -> _Words:
+    """Return words of a gesture with those behind them that have its pose held: "salutes, holds it for 4 seconds"."""
+    bearing, joint = found.stated.bearing, _HOLDING.match(text, found.end)
+    if joint is None or not bearing.gesture or bearing.moves or bearing.stroke_hz or bearing.keys or found.instead:
+        return found
+    hold = held_words(text, joint.end())
+    if hold is None:
+        return found
+    return replace(found, end=hold[1], stated=replace(found.stated, hold_s=hold[0]))
 
 
 def _counted(text: str, found: _Words) -> _Words:
@@ -482,6 +506,16 @@ def _patterns() -> Sequence[tuple[str, str, re.Pattern[str]]]:
         for kind, entries in words.items()
         for kind, pattern in _patterns_of(kind, entries)
     ]
+
+
+@lru_cache(maxsize=1)
+def _unless() -> Mapping[str, re.Pattern[str]]:
+    """Return the pattern of the words beside which a prompt does not ask for a bearing, by its id."""
+    return {
+        name: re.compile(rf"\b(?:{'|'.join(values[UNLESS])})\b")
+        for name, values in bearing_table().items()
+        if UNLESS in values
+    }
 
 
 def _patterns_of(kind: str, entries: Sequence[str]) -> Iterator[tuple[str, str]]:

@@ -74,6 +74,8 @@ RETURNS_S, ALIKE = 0.45, 0.06
 is like the first one."""
 WORDS = ("how", "by", "beside", "gaits", "loads", "read", "adjectives", "beings", "people")
 """Fields of a table of `bearings.toml` that hold words."""
+UNLESS = "unless"
+"""Field that holds words of prompts that ask for no such bearing."""
 
 
 @dataclass(frozen=True)
@@ -211,6 +213,7 @@ class StatedBearing:
         whole: it is said of the person, and holds for all that the person does.
         words: that ask for it.
         times: strokes that the prompt asks for, or how often the gesture is made; None = it names no number.
+        hold_s: seconds for which the pose of the gesture is held; None = the prompt does not say.
     """
 
     name: str
@@ -218,6 +221,7 @@ class StatedBearing:
     whole: bool = False
     words: str = field(default="", compare=False)
     times: int | None = None
+    hold_s: float | None = None
 
     @property
     def acts(self) -> Side:
@@ -285,6 +289,7 @@ def each_once(stated: Iterable[StatedBearing]) -> tuple[StatedBearing, ...]:
             whole=known.whole or each.whole,
             words=words,
             times=known.times or each.times,
+            hold_s=known.hold_s or each.hold_s,
         )
     return tuple(found.values())
 
@@ -326,7 +331,7 @@ def _bearing(name: str, values: Mapping[str, Any]) -> Bearing:
     sides = {side: arms.get(side) or arms.get("both") for side in ("left", "right")}
     poses = {side: ArmPose(**_tuples(pose)) for side, pose in sides.items() if pose is not None}
     keys = Keys(**_tuples(values["keys"])) if "keys" in values else None
-    own = {key: value for key, value in values.items() if key not in ("arms", "keys", *WORDS)}
+    own = {key: value for key, value in values.items() if key not in ("arms", "keys", UNLESS, *WORDS)}
     return Bearing(name, arms=poses, keys=keys, load="loads" in values, **_tuples(own))
 
 

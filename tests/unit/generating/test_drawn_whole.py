@@ -191,3 +191,10 @@ def test_a_bow_between_other_movements_is_no_snap(seed: int) -> None:
     lean = np.degrees(np.arctan2(trunk[:, 2], trunk[:, 1]))
     assert lean.max() > 18
     assert np.abs(np.gradient(lean)).max() * HUMANML3D_263.fps < 150
+
+
+def test_several_kicks_come_one_out_of_the_other() -> None:
+    one, two = (drawn_whole(LAYOUT, "kick", FineWish(count, "left", "low kicks"), 1, None) for count in (1, 2))
+    assert one is not None
+    assert two is not None
+    assert len(one.features) < len(two.features) < 1.75 * len(one.features)

@@ -39,6 +39,9 @@ def test_every_bearing_that_moves_is_drawn() -> None:
     [
         "does burpees",
         "does lunges",
+        "lunges to the left",
+        "pulls her left knee up to her chest",
+        "gallops sideways to the right",
         "a knee strike",
         "moonwalks",
         "stumbles forward and catches himself",
@@ -446,3 +449,54 @@ def test_a_hand_goes_to_the_door_and_the_body_steps_with_it(prompt: str, wrist: 
 )
 def test_others_do_not_name_these_movements(prompt: str) -> None:
     assert not names_movement(prompt)
+
+
+@pytest.mark.parametrize(
+    ("prompt", "front"),
+    [("lunges forward with the left leg", 0), ("lunge, the left leg back", 1), ("deep lunge, right leg in front", 1)],
+)
+def test_the_leg_that_is_named_is_in_front_of_a_single_lunge(prompt: str, front: int) -> None:
+    joints = drawn(prompt)
+    low = joints[:, PELVIS, 1].argmin()
+    assert joints[low, ANKLES, 2].argmax() == front
+    assert np.ptp(joints[low, ANKLES, 2]) > 0.6
+    assert (np.diff((joints[:, PELVIS, 1] < 0.65).astype(int)) == 1).sum() == 1
+
+
+def test_a_lunge_is_held_as_long_as_is_said() -> None:
+    joints = drawn("holds a lunge for four seconds")
+    assert 4.0 < (joints[:, PELVIS, 1] < 0.65).sum() / FPS < 5.2
+
+
+@pytest.mark.parametrize(("side", "sign"), [("left", 1), ("right", -1)])
+def test_a_lunge_to_a_side_bends_one_knee_and_stretches_the_other_leg(side: str, sign: int) -> None:
+    joints = drawn(f"lunges to the {side}")
+    low = joints[joints[:, PELVIS, 1].argmin()]
+    bent, straight = ((1, 4, 7), (2, 5, 8)) if sign > 0 else ((2, 5, 8), (1, 4, 7))
+    angle = [np.degrees(np.arccos(_cosine(low[b] - low[a], low[c] - low[b]))) for a, b, c in (bent, straight)]
+    assert angle[0] > 60
+    assert angle[1] < 35
+    assert sign * (low[bent[2], 0] - joints[0, bent[2], 0]) > 0.5
+
+
+@pytest.mark.parametrize(("side", "knees"), [("left", (4, 5)), ("right", (5, 4))])
+def test_one_knee_is_lifted_as_often_and_as_high_as_is_said(side: str, knees: tuple[int, int]) -> None:
+    low, high = (drawn(f"lifts the {side} knee {height}") for height in ("to hip height", "to the chest"))
+    assert low[:, knees[0], 1].max() > low[0, PELVIS, 1] - 0.15
+    assert high[:, knees[0], 1].max() > low[:, knees[0], 1].max() + 0.05
+    assert np.ptp(high[:, knees[1], 1]) < 0.06
+    thrice = drawn(f"raises the {side} knee to hip height three times")[:, knees[0], 1] > 0.75
+    assert (np.diff(thrice.astype(int)) == 1).sum() == 3
+
+
+@pytest.mark.parametrize(("side", "sign"), [("left", 1), ("right", -1)])
+def test_a_side_gallop_leaves_the_floor_in_each_step_to_its_side(side: str, sign: int) -> None:
+    joints = drawn(f"gallops sideways to the {side}")
+    gone = joints[-1, PELVIS] - joints[0, PELVIS]
+    assert sign * gone[0] > 1.5
+    assert abs(gone[2]) < 0.2
+    assert (joints[:, TOES, 1].min(axis=1) > 0.04).sum() >= 4
+
+
+def _cosine(a: np.ndarray, b: np.ndarray) -> float:
+    return float(a @ b / np.linalg.norm(a) / np.linalg.norm(b))

@@ -22,13 +22,18 @@ LAYOUT = HUMANML3D_263
         ("she bows, holding the pose for 3 seconds", 3.0),
         ("reaches up and holds the stretch for a moment", 1.5),
         ("raises both arms and keeps the position", 1.5),
+        ("bows deeply from the waist, hold three seconds", 3.0),
+        ("holds a squat for five seconds", 5.0),
+        ("raises the right arm for five seconds", 5.0),
         ("he holds the bow in his left hand", None),
         ("squats for two seconds", None),
+        ("holds a plank for eight seconds", None),
+        ("raises his arms and claps for five seconds", None),
     ],
 )
 def test_words_say_how_long_a_pose_is_held(prompt: str, seconds: float | None) -> None:
     assert held_pose(prompt) == seconds
-    assert (stated_length(prompt).seconds is None) == ("squats for" not in prompt)
+    assert (stated_length(prompt).seconds is None) == (seconds is not None or "for" not in prompt)
 
 
 @pytest.mark.parametrize("action", ["squat", "bow", "reach-up"])

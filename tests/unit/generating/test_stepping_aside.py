@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from marey.generation.fine_wish import FineWish
+from marey.generation.named import names_movement
 from marey.generation.stated import stated_features
 from marey.motion.features import HUMANML3D_263
 
@@ -45,3 +46,23 @@ def test_steps_fill_the_seconds_that_are_stated() -> None:
 @pytest.mark.parametrize("prompt", ["strafes left", "keeps stepping to the left", "steps from side to side"])
 def test_ways_on_and_on_are_left_to_networks(prompt: str) -> None:
     assert aside(prompt, "left") is None
+
+
+@pytest.mark.parametrize(
+    ("prompt", "action", "left", "ahead"),
+    [
+        ("walks diagonally forward to the left, 4 steps", "sidestep", 1, 1),
+        ("steps diagonally forward to the right", "sidestep", -1, 1),
+        ("steps forward-right three times", "walk", -1, 1),
+        ("walks diagonally backward to the left", "walk-backward", 1, -1),
+    ],
+)
+def test_diagonal_steps_go_as_far_ahead_as_aside(prompt: str, action: str, left: int, ahead: int) -> None:
+    wish = FineWish(side="left" if left > 0 else "right", prompt=prompt)
+    features = stated_features(LAYOUT, action, wish, None, 1)
+    assert features is not None
+    joints = LAYOUT.decode(features).astype(np.float64)
+    gone = joints[-1, 0] - joints[0, 0]
+    assert left * gone[0] > 0.6
+    assert ahead * gone[2] == pytest.approx(left * gone[0], rel=0.15)
+    assert names_movement(prompt)

@@ -249,3 +249,31 @@ def test_the_turn_of_a_jump_is_part_of_it() -> None:
 )
 def test_a_side_in_a_reason_is_not_the_side_of_the_movement(sentence: str, side: str) -> None:
     assert side_of(sentence) == side
+
+
+@pytest.mark.parametrize(
+    ("sentence", "side"),
+    [
+        ("a person kicks with the right foot while standing on the left", "right"),
+        ("a person stands on one leg, a man balances on one leg, left knee raised", "right"),
+        ("a person does an arabesque on the right leg, left leg stretched behind", "left"),
+    ],
+)
+def test_the_leg_that_stands_is_not_the_one_that_acts(sentence: str, side: str) -> None:
+    steps = wanted_of([sentence])
+    assert steps is not None
+    assert [each.side for step in steps for each in step] == [side]
+
+
+@pytest.mark.parametrize(
+    ("sentence", "actions"),
+    [
+        ("a person walks backward six steps", ["walk-backward"]),
+        ("a person walks sideways four steps", ["sidestep"]),
+        ("a person walks ahead and walks backward six steps", ["walk", "walk-backward"]),
+    ],
+)
+def test_the_steps_of_a_way_back_or_aside_are_no_walk(sentence: str, actions: list[str]) -> None:
+    steps = wanted_of([sentence])
+    assert steps is not None
+    assert [each.action for step in steps for each in step] == actions

@@ -131,7 +131,20 @@ def test_numbers_of_strokes_are_read_with_what_they_count(prompt: str, left: str
         ("does three burpees", "", ["burpee"]),
         ("does five lunges", "", ["lunges"]),
         ("walking lunges", "", ["lunges"]),
-        ("lunges forward", "lunges forward", []),
+        ("lunges forward", "", ["lunges"]),
+        ("deep forward lunge, left leg in front", "", ["lunges"]),
+        ("lunges to the right", "", ["lunges"]),
+        ("lunges at him", "lunges at him", []),
+        ("the knight lunges forward", "the knight lunges forward", []),
+        ("lunges forward and stabs", "lunges forward and stabs", []),
+        ("lifts the right knee to the chest", "", ["knee-raise"]),
+        ("raises his knee to his elbow", "raises his knee to his elbow", []),
+        ("gallops sideways to the left", "", ["side-gallop"]),
+        ("rubs the belly in circles", "", ["belly-rubbed"]),
+        ("headbangs to the music", "", ["head-banging"]),
+        ("fights against a strong wind, leaning in", "walks", ["headwind"]),
+        ("stumbles along blind drunk", "walks along", ["drunk"]),
+        ("hobbles along on a stick", "walks along", ["limp", "cane"]),
         ("she does a fencing lunge", "", ["fencing-lunge"]),
         ("a fencer lunges at the dummy", "", ["fencing-lunge"]),
         ("lunges at him with a sword", "lunges at him with a sword", []),
@@ -622,3 +635,17 @@ def test_canes_beams_and_staggers_are_read(prompt: str, names: set[str]) -> None
 
 def test_a_doer_alone_does_nothing_else() -> None:
     assert BarePrompt.of("maestro directing a choir, both arms").text == ""
+
+
+@pytest.mark.parametrize(
+    ("prompt", "seconds"),
+    [
+        ("salutes and holds it for 4 seconds", 4.0),
+        ("salutes for five seconds", 5.0),
+        ("shrugs, holds the pose for 3 s", 3.0),
+        ("salutes and walks for three seconds", None),
+    ],
+)
+def test_a_gesture_is_held_as_long_as_the_words_behind_it_say(prompt: str, seconds: float | None) -> None:
+    (stated,) = stated_bearings(prompt)
+    assert stated.hold_s == seconds

@@ -42,10 +42,11 @@ def _swinging(rng: random.Random, share: float) -> dict[str, HandPlace]:
     return {side: HandPlace(at, "shoulder", (0.5, -0.6, -0.8)) for side, at in low.items()}
 
 
-def kick(rng: random.Random) -> Gesture:
+def kick(rng: random.Random, *, times: int | None = None) -> Gesture:
     form = rng.choices(["kick-front", "kick-side", "kick-round", "kick-low"], (5, 2, 2, 2))[0]
     guard = rng.random() < 0.5
-    return _side(rng, _kicked(rng, form, guard), ["kick", form, "kick-guard" if guard else ""])
+    done = _kicked(rng, form, guard, times=times or 1)
+    return replace(_side(rng, done, ["kick", form, "kick-guard" if guard else ""]), times=times or 1)
 
 
 _SPUN = ((0, 0.0), (1, 25.0), (2, 185.0), (3, 262.0), (4, 285.0), (5, 345.0), (6, 360.0))
@@ -83,8 +84,8 @@ def high_kick(rng: random.Random, side: str = "") -> Gesture:
     return (done if side == LEFT else done.mirrored()).gesture(rng, ["kick", "kick-front", "kick-high"], side)
 
 
-def _kicked(rng: random.Random, form: str, guard: bool, up: float = 0.0) -> Sequel:
-    """The postures of a kick with the left leg; `up`: metres of the foot over the floor, 0 = by chance."""
+def _kicked(rng: random.Random, form: str, guard: bool, up: float = 0.0, times: int = 1) -> Sequel:
+    """The postures of kicks with the left leg; `up`: metres of the foot over the floor, 0 = by chance."""
     height = {"kick-front": (0.7, 1.2), "kick-side": (0.62, 1.0), "kick-round": (0.7, 1.1), "kick-low": (0.52, 0.66)}
     up = up or rng.uniform(*height[form])
     high = min((up - 0.5) / 0.7, 1.15)
@@ -107,11 +108,12 @@ def _kicked(rng: random.Random, form: str, guard: bool, up: float = 0.0) -> Sequ
     done = Sequel([rng.uniform(0.15, 0.8)])
     if guard:
         done.then(rng.uniform(0.35, 0.55), Posture(hands=arms), rng.uniform(0.05, 0.4))
-    done.then(wind, back)
-    done.then(lift, ready)
-    done.then(out, hit, hold)
-    done.then(1.3 * out, replace(ready, hands=away if not guard else arms))
-    done.then(rng.uniform(0.35, 0.55), Posture(hands=arms) if guard else STAND, 0.1)
+    for _ in range(times):
+        done.then(wind, back)
+        done.then(lift, ready)
+        done.then(out, hit, hold)
+        done.then(1.3 * out, replace(ready, hands=away if not guard else arms))
+        done.then(rng.uniform(0.35, 0.55), Posture(hands=arms) if guard else STAND, 0.1)
     if guard:
         done.then(rng.uniform(0.5, 0.8), STAND)
     return done

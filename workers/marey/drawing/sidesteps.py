@@ -26,6 +26,7 @@ class _Pace:
         leads, follows: shares of a step in which the one foot and the other are in the air.
         sinks: metres by which the body sinks.
         arms: degrees by which the arms are lifted.
+        hops: metres by which the body rises while both feet are in the air.
     """
 
     seconds: tuple[float, float]
@@ -34,14 +35,16 @@ class _Pace:
     follows: tuple[float, float]
     sinks: float
     arms: float
+    hops: float = 0.0
 
 
 PACES = {
     "slow": _Pace((1.0, 1.25), (0.3, 0.38), (0.0, 0.45), (0.5, 0.95), 0.01, 6.0),
     "": _Pace((0.62, 0.74), (0.44, 0.52), (0.0, 0.52), (0.46, 0.98), 0.02, 8.0),
     "fast": _Pace((0.3, 0.33), (0.6, 0.66), (0.0, 0.6), (0.4, 1.0), 0.06, 20.0),
+    "gallop": _Pace((0.46, 0.52), (0.6, 0.68), (0.0, 0.6), (0.22, 0.86), 0.03, 26.0, 0.055),
 }
-_SINGLE = {"slow": (0.43, 0.48), "": (0.54, 0.64), "fast": (0.54, 0.64)}
+_SINGLE = {"slow": (0.43, 0.48), "": (0.54, 0.64), "fast": (0.54, 0.64), "gallop": (0.6, 0.68)}
 """Metres of a step that is the only one, by pace."""
 _LIFT = 0.07
 _FARTHEST = 0.7
@@ -58,6 +61,7 @@ def sidestep(
     pace: str = "",
     seconds: float = 3.0,
     metres: float | None = None,
+    ahead: float = 0.0,
 ) -> Gesture:
     """Steps to a side, one after the other; the body faces ahead.
 
@@ -65,9 +69,10 @@ def sidestep(
         rng: decides lengths and times.
         side: left or right.
         count: of the steps; None = as many as there is time for.
-        pace: slow, fast, or empty: as one walks.
+        pace: slow, fast, gallop: with a hop in each step, or empty: as one walks.
         seconds: that it has to fill, without a `count`.
         metres: that the steps go in all; None = as far as they come.
+        ahead: degrees by which they go ahead of the side, less than 0: behind it.
     """
     form = PACES[pace]
     period, lift = rng.uniform(*form.seconds), _LIFT * rng.uniform(0.8, 1.1)
@@ -89,13 +94,24 @@ def sidestep(
             OTHER_SIDE[side]: _foot(time / period, steps, form.follows, far, lift),
         }
         hips = blurred(np.mean([foot[:, 0] for foot in feet.values()], axis=0), _HIPS_S * FPS)
-        body.shift(-form.sinks * way, left=SIGN[side] * hips)
+        out, forward = np.cos(np.radians(ahead)), np.sin(np.radians(ahead))
+        body.shift(-form.sinks * way, forward * hips, left=SIGN[side] * out * hips)
         for one, foot in feet.items():
-            moved = body.world(np.stack([SIGN[one] * SIGN[side] * foot[:, 0], foot[:, 1], 0 * time], axis=1), one)
+            aside = SIGN[one] * SIGN[side] * out * foot[:, 0]
+            moved = body.world(np.stack([aside, foot[:, 1], forward * foot[:, 0]], axis=1), one)
             body.joints[:, LEGS[one][2:]] += moved[:, None]
         settle(body)
+        if form.hops:  # settled feet are on the floor
+            body.joints[..., 1] += form.hops * _in_air(time / period, steps, form)[:, None]
 
     return Gesture(start + steps * period + rests, ("sidestep",), change, side, steps)
+
+
+def _in_air(steps: Array, count: int, form: _Pace) -> Array:
+    """Return how high a body is in its hops (T,), 0 to 1, at a time in steps."""
+    share = (steps % 1.0 - form.follows[0]) / max(form.leads[1] - form.follows[0], 1e-6)
+    rises = 4 * share * (1 - share)
+    return np.where((steps >= 0) & (steps < count), np.clip(rises, 0.0, 1.0), 0.0)
 
 
 def _foot(steps: Array, count: int, swings: tuple[float, float], far: float, lift: float) -> Array:

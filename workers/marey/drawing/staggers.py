@@ -25,6 +25,7 @@ _STEP_M, _SIDE_STEP_M, _STEP_S = (0.26, 0.52), (0.5, 0.7), (0.4, 0.62)
 _CROSSED = 0.3  # share of the steps ahead that cross the line
 _ENDS = ((7.0, 0.6), (-5.0, 0.7), (2.0, 0.7))  # degrees and seconds of the sways at the end
 _BRIEF_S = (0.05, 0.12)  # seconds of standing before and after a stagger beside other things
+_STRUCK_S, _STRUCK = 0.16, (16.0, 22.0)  # seconds of a blow, and degrees of the trunk
 _NEAR_FALL = (0.5, 20.0)  # metres of the step that catches it, and degrees of the trunk
 
 
@@ -39,6 +40,7 @@ class _Stagger:
         caught: number of the step that catches a fall; -1 = none.
         starts: seconds of standing before it.
         brief: it sways once at its end.
+        struck: degrees by which a blow throws the trunk back before it; 0 = none does.
     """
 
     way: str
@@ -47,6 +49,7 @@ class _Stagger:
     caught: int
     starts: float
     brief: bool = False
+    struck: float = 0.0
 
     def sequel(self, feet: dict[str, StandingFoot]) -> Sequel:
         """The postures over the feet of an idle."""
@@ -54,6 +57,8 @@ class _Stagger:
         at = {side: (SIGN[side] * feet[side].out, feet[side].forward) for side in SIDES}
         done = Sequel([self.starts])
         side, middle = self.leads, 0.0
+        if self.struck:
+            done.then(_STRUCK_S, self._struck())
         for number, (stride, seconds, off, sway) in enumerate(self.strides):
             middle += stride if not left or side == self.way else 0.0
             if left:
@@ -65,6 +70,15 @@ class _Stagger:
             at[side], side = there, OTHER_SIDE[side]
         self._stand(done, at, side, feet)
         return done
+
+    def _struck(self) -> Posture:
+        """The posture into which a blow throws the body: away from where it comes, arms ahead."""
+        left, ahead = STAGGER_WAYS[self.way]
+        pitch, roll = ahead * self.struck, -left * self.struck
+        hands = {side: HandPlace((0.26, -0.2, 0.3), "shoulder", (0.7, -0.6, -0.4)) for side in SIDES}
+        hips = (0.05 * left, 0.9, 0.05 * ahead)
+        neck = (-0.9 * pitch, -0.6 * roll, 0.0)
+        return Posture(hips, (0.3 * pitch, 0.4 * roll, 0), (0.8 * pitch, 0.6 * roll, 0), neck, hands=hands)
 
     def _step(
         self,
@@ -119,7 +133,13 @@ def _foot(side: str, at: tuple[float, float], up: float = _FLAT) -> FootPlace:
 
 
 def stagger(
-    rng: random.Random, way: str = "", *, nearly_falls: bool = False, steps: int | None = None, brief: bool = False
+    rng: random.Random,
+    way: str = "",
+    *,
+    nearly_falls: bool = False,
+    steps: int | None = None,
+    brief: bool = False,
+    struck: bool = False,
 ) -> Gesture:
     """Crooked steps of a body that loses its balance.
 
@@ -129,6 +149,7 @@ def stagger(
         nearly_falls: one of the steps catches the body.
         steps: how many; None = as many as go two to three metres.
         brief: other things are done before or after it: it starts at once and sways once at its end.
+        struck: a blow throws the body that way.
     """
     way = way or "ahead"
     aside, number = way in SIDES, steps or (rng.choice((4, 5)) if brief else rng.choice((7, 8)))
@@ -143,7 +164,8 @@ def stagger(
         off = rng.uniform(-0.06, 0.06) + drift * (1 if step % 4 < 2 else -1) - (SIGN[side] * 0.09 if crosses else 0.0)
         metres = _NEAR_FALL[0] if step == caught else metres
         strides.append((metres, rng.uniform(*_STEP_S), off, rng.uniform(7.0, 15.0) * rng.choice((-1.0, 1.0, 1.0))))
-    form = _Stagger(way, leads, tuple(strides), caught, rng.uniform(*_BRIEF_S if brief else (0.3, 0.5)), brief)
+    starts, blow = rng.uniform(*_BRIEF_S if brief else (0.3, 0.5)), rng.uniform(*_STRUCK) if struck else 0.0
+    form = _Stagger(way, leads, tuple(strides), caught, starts, brief, blow)
     return on_feet(
         form.sequel, ["stagger"], rng.uniform(*(_BRIEF_S if brief else (0.3, 0.6))), side=way if aside else ""
     )

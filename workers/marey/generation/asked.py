@@ -61,7 +61,7 @@ from marey.vocabulary.courses import WayCourse, dribbles_ahead, stated_course
 from marey.vocabulary.distances import stated_distance
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.gazes import Glance, stated_gaze, without_gaze
-from marey.vocabulary.held_poses import held_pose
+from marey.vocabulary.held_poses import held_pose, stated_hold
 from marey.vocabulary.scope import STANDING
 from marey.vocabulary.turns import WHOLE, Turn, stated_spins, stated_turn
 
@@ -160,6 +160,8 @@ class _Wish:
         if not action:
             return cls(steps, limb=limb_of(prompt) if steps is None else None, gaze=gaze)
         count = stated_count(prompt, action) if action in COUNTABLE else None
+        if count is None and action in HOLDING & COUNTED.keys() and held_pose(prompt) is not None:
+            count = 1
         if action == SPINNING:
             count = count or stated_spins(prompt)
         turn, pace = stated_turn(without_gaze(prompt), action), AskedPace.of(prompt, action)
@@ -203,6 +205,9 @@ class _Wish:
         far = frames_of_distance(self.metres, self.action, limits, fixed) if self.metres else None
         if far is not None:
             return replace(request, frames=far)
+        hold = stated_hold(request.text.said) if self.action not in HOLDING else None
+        if hold is not None and request.open:  # a pose that is not drawn is there all the time
+            return replace(request, frames=limits.within(max(round(hold * limits.fps), request.frames or 0)))
         if self.pace.most == 1.0 or request.open or request.frames is None:
             return request
         return replace(request, frames=limits.within(round(request.frames * self.pace.most)))

@@ -23,7 +23,7 @@ from marey.drawing.holds import LYING
 from marey.generation.asked import action_of
 from marey.generation.done import AGAIN_HELD, BEGINS_S, FALL, PACES, raised_s
 from marey.generation.gaits import GAITS, STAMP_S, stomping
-from marey.generation.hits import hit_part
+from marey.generation.hits import states_hit
 from marey.generation.leans import trunk_shares
 from marey.generation.marching import marches_straight
 from marey.generation.port import MotionFeatures, Request
@@ -186,7 +186,7 @@ def _posed(row: TimedText, action: str) -> str:
 def _with_drawn(stated: Sequence[StatedBearing], action: str, said: str) -> list[StatedBearing]:
     """Return bearings with the one that an action is drawn as; a load that the prompt names takes its place."""
     names_load = action in DRAWN_ON and any(each.bearing.load for each in stated)
-    if action in DRAWN_AS and hit_part(said):  # who is hit and "stumbles back" takes a step, and is not drunk
+    if action in DRAWN_AS and states_hit(said):  # who is hit and "stumbles back" takes a step, and is not drunk
         stated = [each for each in stated if each.whole or not each.bearing.gait]
     if goes_in_place(said, action):  # its knees are drawn as high as they go
         stated = [each for each in stated if each.bearing.gait not in ("high-knees", "skip", "stagger")]
@@ -200,7 +200,7 @@ def _with_drawn(stated: Sequence[StatedBearing], action: str, said: str) -> list
 def _drawn_as(action: str, said: str) -> list[StatedBearing]:
     """Return the bearing that an action is drawn as, in a list; an empty one if a network shows it, or its prompt
     states the form in which it is drawn whole."""
-    is_whole = action in DRAWN_AS and bool(hit_part(said))
+    is_whole = action in DRAWN_AS and states_hit(said)
     return [StatedBearing(_ACTS[action])] if action in _ACTS and not is_whole else []
 
 
@@ -337,7 +337,7 @@ def _once(
     bearing, at, count = stated.bearing, span.gestures.index(stated), len(span.gestures)
     first = span.begin + (LATE * (span.end - span.begin) if span.action in MOVES_FIRST else 0.0)
     begin, end = (first + (span.end - first) * share / count for share in (at, at + 1))
-    seconds, rise, hold = (end - begin) / fps, raised_s(bearing), rng.uniform(*bearing.hold_s)
+    seconds, rise, hold = (end - begin) / fps, raised_s(bearing), stated.hold_s or rng.uniform(*bearing.hold_s)
     fall, pace = bearing.fall_s or FALL * rise, PACES[0] + (PACES[1] - PACES[0]) * (GOLDEN * span.seed % 1.0)
     again = stated.times if stated.times is not None and not bearing.strokes_s(1) else 1
     through = bearing.strokes_s(stated.times or (1 if bearing.keys else max(round(hold * bearing.stroke_hz), LEAST)))

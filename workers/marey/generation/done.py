@@ -30,7 +30,7 @@ def done_s(stated: StatedBearing) -> float:
         return stated.times * STAMP_S + 2 * BEGINS_S
     if not stated.is_done:
         return 0.0
-    rise, hold = raised_s(bearing), sum(bearing.hold_s) / 2
+    rise, hold = raised_s(bearing), stated.hold_s or sum(bearing.hold_s) / 2
     around, through = rise + (bearing.fall_s or FALL * rise), bearing.strokes_s(stated.times or 1)
     if not through and stated.times is not None:
         return stated.times * (around + AGAIN_HELD * bearing.hold_s[1])

@@ -8,7 +8,9 @@ from collections.abc import Mapping
 
 from marey.drawing.dodges import flinch
 from marey.drawing.gesture import Gesture
+from marey.drawing.staggers import stagger
 from marey.generation.fine_wish import FineWish
+from marey.vocabulary.counts import stated_things
 
 _PARTS: Mapping[str, re.Pattern[str]] = {
     "leg": re.compile(r"\b(?:legs?|thighs?|knees?|shins?|foot|ankles?|cal(?:f|ves))\b"),
@@ -33,6 +35,25 @@ _HEAVY = re.compile(
     r"\b(?:hard|heav\w+|stagger\w*|stumbl\w*|reel\w*|powerful\w*|strong\w*|big|huge|violent\w*|brutal\w*"
     r"|knock\w* back\w*)\b"
 )
+_STEPS = frozenset({"step", "steps", "paces", "pace"})
+_TRAVELS = re.compile(
+    r"\b(?:stagger|stumbl|reel|recoil|totter|lurch|stepp?|knock|push|driv|thrown?|send|sent|shov|forc)\w*\b[^,.;]*?"
+    r"\b(?P<way>back(?:wards?)?|forwards?|sideways|to (?:the|his|her|their) (?P<side>left|right))\b"
+)
+"""Words of steps that a blow makes a body take, and their way."""
+_SOME_STEPS = re.compile(r"\b(?:a few|some|several|a couple of) (?:\w+ )?(?:steps|paces)\b")
+MOST_STEPS, FEW_STEPS = 8, 3
+
+
+def states_hit(prompt: str) -> bool:
+    """Return True if a prompt says where a blow hits, or that it makes the body go some steps."""
+    return bool(hit_part(prompt)) or _steps(prompt.lower()) is not None
+
+
+def _steps(text: str) -> int | None:
+    """Return the steps that a blow makes a body take; None = it stays where it is, or the words do not say."""
+    number = stated_things(text, _STEPS) or (FEW_STEPS if _SOME_STEPS.search(text) else None)
+    return None if number is None else min(max(number, 1), MOST_STEPS)
 
 
 def hit_part(prompt: str) -> str:
@@ -42,9 +63,15 @@ def hit_part(prompt: str) -> str:
 
 
 def stated_hit(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture | None:
-    """Return what a blow does to the part that a prompt names; None if it names none."""
+    """Return what a blow does to the part that a prompt names, or the steps that it makes the body take; None if it
+    names neither."""
     del seconds
     part, text = hit_part(wish.prompt), wish.prompt.lower()
+    steps = _steps(text)
+    if steps is not None:
+        goes = _TRAVELS.search(text)
+        way = "ahead" if goes and goes["way"].startswith("forward") else (goes and goes["side"]) or "back"
+        return stagger(rng, way, steps=steps, brief=any(wish.beside), struck=True)
     if not part:
         return None
     named = _SIDE_NAMED.search(text)

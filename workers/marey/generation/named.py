@@ -17,13 +17,15 @@ from marey.drawing.burpees import burpees
 from marey.drawing.dives import ground_slide, side_dive
 from marey.drawing.doors import pulled_door, pushed_door
 from marey.drawing.errands import cower, curtsy, rowing, shelf_lift, shoe_tied
-from marey.drawing.gesture import Gesture
+from marey.drawing.gesture import SIDES, Gesture
+from marey.drawing.knee_raises import knee_raise
 from marey.drawing.knee_strikes import knee_strike
 from marey.drawing.lunges import lunges
 from marey.drawing.moonwalks import moonwalk
 from marey.drawing.peeks import catch, peek
 from marey.drawing.pitches import pitch
 from marey.drawing.planks import plank
+from marey.drawing.sidesteps import sidestep
 from marey.drawing.slips import slip_caught
 from marey.drawing.sports import bowling, fencing_lunge, field_throw, jump_shot, tennis_serve
 from marey.drawing.staggers import stagger
@@ -31,9 +33,12 @@ from marey.drawing.stumbles import stumble
 from marey.drawing.vacuuming import vacuuming
 from marey.generation.dancing import named_dance
 from marey.generation.fine_wish import FineWish
+from marey.generation.stepping_aside import goes_diagonally
+from marey.posing.standing import OTHER_SIDE
 from marey.vocabulary.bearing_words import stated_bearings
 from marey.vocabulary.bearings import StatedBearing
 from marey.vocabulary.counts import stated_number, stated_things
+from marey.vocabulary.held_poses import held_pose, stated_hold, without_held_pose
 from marey.vocabulary.in_place import goes_in_place
 
 MOST = 8
@@ -43,7 +48,16 @@ BURPEE_S = 3.6
 LUNGE_S = 1.9
 """Seconds of one of several lunges."""
 _WALKING = re.compile(r"\bwalking\b|\b(?:across|along|down) the\b")
-_REVERSE = re.compile(r"\b(?:reverse|backwards?)\b")
+_REVERSE = re.compile(r"\b(?:reverse|backwards?)\b|\blung\w+ back\b")
+_SIDE_LUNGE = re.compile(r"\b(?:side|lateral|sideways)\b|\bto (?:the|his|her) (?:left|right)\b")
+_ONE_LUNGE = re.compile(
+    r"\blunge\b(?! exercises?)|^lung(?:es|ing|ed)\b(?! (?:\w+ )?(?:with|on) (?:alternat\w+|each)| exercises?)"
+)
+"""Words of a single lunge: of a noun, or of a verb."""
+_EXERCISE = re.compile(r"\W*lunges\W*")
+_REAR_LEG = re.compile(r"\b(left|right) (?:leg|foot|knee) (?:back|behind)\b")
+_TO_CHEST = re.compile(r"\b(?:chest|chin|belly|stomach|high)\b")
+_PULLS = re.compile(r"^(?:pull|draw|hug)")
 _STEPS = frozenset({"step", "steps", "paces"})
 _BACK = re.compile(r"\bback(?:wards?)?\b")
 _SLIPS = re.compile(r"\bslip|\bfooting\b")
@@ -84,14 +98,14 @@ def named_movement(wish: FineWish, rng: random.Random, seconds: float | None) ->
 
 
 def names_movement(prompt: str) -> bool:
-    """Return True if a prompt asks for a movement or a dance by name, or for a gait in place: no rule of an action is
-    for it."""
+    """Return True if a prompt asks for a movement or a dance by name, for a gait in place or for diagonal steps: no
+    rule of an action is for it."""
     moves = any(each.bearing.moves for each in stated_bearings(prompt))
-    return moves or bool(named_dance(prompt)) or goes_in_place(prompt, "walk")
+    return moves or bool(named_dance(prompt)) or goes_in_place(prompt, "walk") or goes_diagonally(prompt)
 
 
 def _times(stated: StatedBearing) -> int | None:
-    number = stated_number(stated.words)
+    number = stated_number(without_held_pose(stated.words))
     return None if number is None else min(number, MOST)
 
 
@@ -103,12 +117,28 @@ def _burpees(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds:
 
 
 def _lunges(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
-    del wish
-    words = stated.words
+    words, hold = stated.words, stated_hold(wish.prompt)
     form = "walking" if _WALKING.search(words) else "back" if _REVERSE.search(words) else "ahead"
-    single = re.search(r"\ba (?:\w+ )*lunge\b", words)
+    form = "aside" if _SIDE_LUNGE.search(words) else form
     room = None if seconds is None else min(max(int((seconds - 1.5) / LUNGE_S), 1), MOST)
-    return lunges(rng, form, _times(stated) or (1 if single else room), stated.side)
+    rear = _REAR_LEG.search(words)
+    side = OTHER_SIDE[rear[1]] if rear and form == "ahead" else stated.side
+    single = hold is not None or (_ONE_LUNGE.search(words) and not _EXERCISE.fullmatch(wish.prompt.lower()))
+    times = _times(stated) or (1 if single else room)
+    return lunges(rng, form, times, side, hold)
+
+
+def _knee_raise(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del seconds
+    height, pulled = "chest" if _TO_CHEST.search(stated.words) else "hip", bool(_PULLS.search(stated.words))
+    return knee_raise(rng, stated.side, _times(stated), height=height, pulled=pulled, hold=held_pose(wish.prompt))
+
+
+def _side_gallop(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del wish
+    side, lasts = stated.side or rng.choice(SIDES), seconds or rng.uniform(3.0, 3.8)
+    count = _times(stated) or stated_things(stated.words, _STEPS)
+    return sidestep(rng, side, count=count, pace="gallop", seconds=lasts)
 
 
 def _knee_strike(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
@@ -249,16 +279,18 @@ def _plank(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: f
     form = "side" if re.search(r"\bside\b(?! by)", words) else "hands" if _ON_HANDS.search(words) else ""
     enters = bool(wish.beside[0]) or _GETS_DOWN.search(words) is not None
     leaves = bool(wish.beside[1])
-    lasts = seconds or rng.uniform(4.0, 5.5) + 1.5 * enters + 1.5 * leaves
+    lasts = seconds or stated_hold(wish.prompt) or rng.uniform(4.0, 5.5) + 1.5 * enters + 1.5 * leaves
     return plank(rng, form, stated.side, seconds=lasts, enters=enters, leaves=leaves)
 
 
 NAMED: Mapping[str, Callable[[StatedBearing, FineWish, random.Random, float | None], Gesture]] = {
     "burpee": _burpees,
     "lunges": _lunges,
+    "knee-raise": _knee_raise,
     "knee-strike": _knee_strike,
     "moonwalk": _moonwalk,
     "stumble": _stumble,
+    "side-gallop": _side_gallop,
     "stagger": _stagger,
     "side-dive": _side_dive,
     "ground-slide": _ground_slide,

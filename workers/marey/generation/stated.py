@@ -33,7 +33,7 @@ from marey.generation.kneeling import drops_asked_for
 from marey.generation.named import named_movement
 from marey.generation.raising import stated_raise
 from marey.generation.stairs import stairs_asked_for
-from marey.generation.stepping_aside import steps_aside
+from marey.generation.stepping_aside import diagonal_asked_for, steps_aside
 from marey.generation.stepping_in_place import gait_asked_for_in_place
 from marey.generation.strides import strides_asked_for
 from marey.generation.turning import spin_asked_for, turn_asked_for, turn_in_place
@@ -128,11 +128,15 @@ STATED: Mapping[str, Statement] = {
     "spin": spin_asked_for,
     "climb-stairs": stairs_asked_for,
     "walk": lambda wish, rng, seconds: (
-        gait_asked_for_in_place("walk", wish, rng, seconds) or strides_asked_for(wish, rng, seconds, back=False)
+        gait_asked_for_in_place("walk", wish, rng, seconds)
+        or diagonal_asked_for(wish, rng, seconds)
+        or strides_asked_for(wish, rng, seconds, back=False)
     ),
     "run": partial(gait_asked_for_in_place, "run"),
     "sprint": partial(gait_asked_for_in_place, "sprint"),
-    "walk-backward": lambda wish, rng, seconds: strides_asked_for(wish, rng, seconds, back=True),
+    "walk-backward": lambda wish, rng, seconds: (
+        diagonal_asked_for(wish, rng, seconds) or strides_asked_for(wish, rng, seconds, back=True)
+    ),
     **dict.fromkeys(("pick-up", "reach-forward"), stated_load),
     **dict.fromkeys(("dodge", "jump", "jump-forward"), jumps_away),
 }

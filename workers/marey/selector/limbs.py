@@ -11,6 +11,7 @@ import numpy as np
 from marey.selector.matching import side_of
 from marey.selector.motion import Motion
 from marey.vocabulary.entries import load_vocabulary
+from marey.vocabulary.legs import stated_leg
 
 MORE = 1.1
 """How many times as much as the other a limb does that is the one that acts."""
@@ -49,7 +50,7 @@ def limb_of(prompt: str, action: str | None = None) -> NamedLimb | None:
         prompt: as a user typed it.
         action: id of the one action that it asks for; None = one that is not in the vocabulary: its words decide.
     """
-    side = side_of(prompt)
+    side = (stated_leg(prompt, action) if action in LIFTED else "") or side_of(prompt)
     if side not in ("left", "right"):
         return None
     if action in LIFTED:

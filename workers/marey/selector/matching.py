@@ -14,6 +14,7 @@ from marey.selector.repetitions import REPETITIONS
 from marey.selector.rules import EXACT, RULES, TURNS, WHILE_TURNING, Rule
 from marey.vocabulary.counts import STEPPING, is_single_step, stated_count
 from marey.vocabulary.entries import load_vocabulary
+from marey.vocabulary.legs import stated_leg
 from marey.vocabulary.scope import every_action, match_scope
 from marey.vocabulary.turns import stated_turn, turns_in_place
 
@@ -25,6 +26,8 @@ FEWEST_CUTS = 7
 
 NOT_AS_OFTEN = 0.4
 """Best value of a motion with another number of repetitions than was asked for."""
+WALKED = frozenset({"walk-backward", "sidestep"})
+"""Ways of steps that do not go ahead."""
 WAYS, ON_THE_SPOT, TURNING = frozenset({"walk", "run", "sprint"}), "turn-around", "turn"
 """A way and a turn to one side in one sentence are a turn on the way: "walks and turns left 90 degrees"."""
 SEVERAL: Mapping[str, int] = {"clap": 3, "jumping-jacks": 2, "nod": 2, "wave": 2, **dict.fromkeys(STEPPING, 4)}
@@ -44,6 +47,11 @@ _REASON = re.compile(
     re.DOTALL,
 )
 """Words of why something is done, which may name the other side."""
+_STEPS_OF_WAY = re.compile(
+    r"\b(?:back(?:wards?)?|sideways|left|right),? (?:for |by )?(?:\w+ ){1,2}(?:steps|paces|strides)\b"
+)
+_GOES = re.compile(r"\b(?:walk|step|go|mov|pac|strid|march|strafe|head)(?:e?s|ing|e|es)?\b(?<!\bsteps)(?<!\bpaces)")
+"""Words of a number of steps of a way back or to a side, and verbs of ways."""
 _LETTER = re.compile(r"\b([lr])[ -](?:hand|arm|fist|palm|elbow|leg|foot|knee)\b")
 
 
@@ -130,6 +138,8 @@ def _step(sentence: str) -> Step | None:
     beside = {other for name in names for other in (*actions[name].implies, actions[name].kind_of)}
     if len(names) > 1:
         beside.add("idle")
+    if WALKED & set(names) and _STEPS_OF_WAY.search(sentence.lower()) and len(_GOES.findall(sentence.lower())) < 2:
+        beside.add("walk")  # whose noun the steps are
     wanted = [name for name in names if name not in beside] or names
     prompt = sentence if first is None else sentence[len(actions[first].plain_words) :]  # "bows, bows" asks for one bow
     side = side_of(prompt)
@@ -140,7 +150,7 @@ def _step(sentence: str) -> Step | None:
         tuple(
             WantedAction(
                 name,
-                side if actions[name].sided else "",
+                (stated_leg(prompt, name) or side) if actions[name].sided else "",
                 degrees=_degrees(prompt, name),
                 count=_count(prompt, name) if name == counted else None,
                 in_place=_is_in_place(name, wanted, prompt),
