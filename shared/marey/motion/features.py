@@ -111,8 +111,12 @@ def encode_all(layout: FeatureLayout, joints: Array) -> Float32:
     """Encode a motion (T, J, 3) as features (T, D): those of a frame hold the step to the next, so the last step is
     repeated. A body that stays over the floor y = 0, as one that hangs does, keeps its height; every other one is put
     onto the floor, as by `canonicalize`."""
-    whole = np.concatenate([joints, 2 * joints[-1:] - joints[-2:-1]])
-    lowest = float(whole[..., 1].min())
+    lowest = float(joints[..., 1].min())
+    beyond = 2 * joints[-1:] - joints[-2:-1]
+    # The lowest point of all frames becomes the floor, and a foot that comes down at the end would go on through it:
+    # the whole motion would be lifted by a frame that it does not have.
+    beyond[..., 1] = np.maximum(beyond[..., 1], lowest)
+    whole = np.concatenate([joints, beyond])
     if lowest < LIFTED:
         return layout.encode(whole)
     on_floor = whole[-1:] - [0.0, float(whole[-1, :, 1].min()), 0.0]  # a frame more, of which the floor is found
@@ -302,6 +306,18 @@ class HeadingLayout:
         joints[..., 1:, [0, 2]] = flat + root[..., None, [0, 2]]
         joints[..., 1:, 1] = local[..., 1]
         return joints
+
+    def move_joints(self, features: Float32, moved: Array) -> Float32:
+        """Return features (T, D) of joints that are moved by (T, J, 3) metres in the world of `decode`; the root stays,
+        and so do the 6D block and the contacts, which `decode` does not read."""
+        half_yaw = self.root_trajectory(features)[0]
+        steps = np.diff(moved, axis=0, append=moved[-1:])
+        changed = features.copy()
+        for name, values in (("positions", moved[:, 1:]), ("velocities", steps)):
+            local = np.array(values, np.float64) / self.unit
+            local[..., [0, 2]] = to_world(-half_yaw[:, None], local[..., [0, 2]])
+            changed[:, self.slices[name]] += local.reshape(len(local), -1).astype(np.float32)
+        return changed
 
     def contacts(self, features: Array) -> NDArray[np.bool_]:
         """Return contacts (..., Tf, 4): L ankle, L toe, R ankle, R toe."""

@@ -73,6 +73,16 @@ def test_the_dead_fall_from_standing_with_gravity_and_stay_down(made: list[Part]
             assert faces > 0
 
 
+def test_feet_turn_over_within_several_frames(made: list[Part]) -> None:
+    for part in (*of(made, "die"), *of(made, "roll"), *of(made, "flip")):
+        for ankle, toe in ((7, 10), (8, 11)):
+            foot = part.joints[:, toe] - part.joints[:, ankle]
+            foot /= np.linalg.norm(foot, axis=-1, keepdims=True)
+            turns = np.degrees(np.arccos(np.clip((foot[1:] * foot[:-1]).sum(-1), -1.0, 1.0)))
+            assert turns.max() < 31.0, part.source.captions
+            assert part.joints[:, toe, 1].min() > -0.02, part.source.captions
+
+
 def test_a_dodge_moves_the_head_fast_and_ends_on_the_feet(made: list[Part]) -> None:
     sides = Counter(part.source.side for part in of(made, "dodge"))
     assert {"left", "right", ""} == sides.keys()

@@ -220,6 +220,18 @@ def test_a_posture_puts_hips_hand_and_foot_where_it_says() -> None:
     np.testing.assert_allclose(joints[-1], before[-1], atol=0.02)
 
 
+@pytest.mark.parametrize(("seconds", "hops"), [(0.8, False), (0.2, True)])
+def test_feet_that_go_elsewhere_step_one_after_the_other_if_there_is_time(seconds: float, hops: bool) -> None:
+    body = StandingBody(idle(3.0).joints)
+    feet = {"left": FootPlace((0.11, 0.07, 0.2)), "right": FootPlace((0.12, 0.115, -0.2), (0.2, -0.72, 0.65))}
+    low = Posture((0.0, 0.5, -0.05), (20.0, 0.0, 0.0), (20.0, 0.0, 0.0), feet=feet)
+    pose(body, (0.5, 0.5 + seconds, 1.7, 1.7 + seconds), (STAND, low, low, STAND))
+    toes = body.solved()[:, [10, 11]]
+    assert np.ptp(toes[..., 2], axis=0).min() > 0.18
+    assert toes[..., 1].max(axis=0).min() > 0.07
+    assert (toes[..., 1].min(axis=1).max() > 0.05) == hops
+
+
 def test_a_mirrored_posture_twice_is_itself() -> None:
     posture = Posture(
         (0.1, 0.8, 0.0), (1, 2, 3), (4, 5, 6), (7, 8, 9), hands={"left": HandPlace((0, 0, 0))}, over="right"

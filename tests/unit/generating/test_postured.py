@@ -16,6 +16,8 @@ LAYOUT, FPS = HUMANML3D_263, HUMANML3D_263.fps
 LIES = dict.fromkeys((BACK, FRONT, PRONE), 0.125)
 LOW = {SEAT: 0.5, FLOOR: 0.17, UPRIGHT: 0.17, KNEES: 0.51, KNEE: 0.51, FOURS: 0.47, PLANK: 0.4, CROUCH: 0.52, **LIES}
 STANDS_M, NEAR_M = 0.93, 0.15
+SOLE_M = 0.03
+"""Metres of the lowest joint of a drawn body over its floor; features have it on the floor."""
 
 
 def joints_of(held: RowPosture, said: str = "", frames: int | None = None) -> np.ndarray:
@@ -160,7 +162,7 @@ def test_a_movement_that_ends_low_goes_on_from_there(action: str, leaves: str, e
     features = gone_on(made.features, LAYOUT, RowPosture(leaves=leaves, end=end, seed=seed))
     assert np.array_equal(features[: len(made.features)], made.features)
     joints = LAYOUT.decode(features)[len(made.features) - 2 :]
-    assert joints[-1, 0, 1] == pytest.approx(LOW.get(end, STANDS_M), abs=NEAR_M)
+    assert joints[-1, 0, 1] == pytest.approx(LOW.get(end, STANDS_M), abs=NEAR_M + SOLE_M)
     assert joints[..., 1].min() > -0.04
     assert np.linalg.norm(np.diff(joints, axis=0), axis=-1).max() < 0.35, "no joint leaps"
     same = RowPosture(leaves=leaves, end=leaves, seed=seed)

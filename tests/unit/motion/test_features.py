@@ -14,6 +14,7 @@ from marey.motion.features import (
     LAYOUTS,
     FeatureLayout,
     canonicalize,
+    encode_all,
     layout,
     mirror_joints,
 )
@@ -103,6 +104,28 @@ def test_canonical_motion_faces_z_over_the_origin_on_the_floor():
     np.testing.assert_allclose(facing(place[0], HUMANML3D), [0, 0, 1], atol=1e-9)
     np.testing.assert_allclose(place[0, 0, [0, 2]], 0, atol=1e-9)
     assert place[..., 1].min() == pytest.approx(0, abs=1e-9)
+
+
+@pytest.mark.parametrize("each", HEADING, ids=lambda each: each.name)
+@pytest.mark.parametrize("last_step", [-0.08, 0.0, 0.08])
+def test_a_whole_motion_stays_on_the_floor_when_it_ends_in_a_step_down_or_up(each, last_step):
+    joints = dance(each.skeleton)
+    joints[-2:] = joints[:1]
+    joints[..., 1] -= joints[..., 1].min()
+    foot = each.skeleton.feet[0]
+    joints[-2:, foot, 1] = max(-last_step, 0.0), max(last_step, 0.0)
+    made = each.decode(encode_all(each, joints))
+    assert len(made) == len(joints)
+    assert made[..., 1].min() == pytest.approx(0, abs=1e-5)
+
+
+@pytest.mark.parametrize("falls", [0.0, 0.05, 0.3])
+def test_a_hanging_body_keeps_its_height_whatever_its_last_step(falls):
+    joints = dance()
+    joints[..., 1] += 0.15 - joints[..., 1].min()
+    joints[-2] += [0.0, falls, 0.0]
+    made = HUMANML3D_263.decode(encode_all(HUMANML3D_263, joints))
+    np.testing.assert_allclose(made[..., 1], joints[..., 1], atol=1e-5)
 
 
 def test_the_yaw_rate_is_half_the_step_of_the_heading():

@@ -10,7 +10,7 @@ from hypothesis.extra.numpy import arrays
 from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.ndimage import gaussian_filter1d
 
-from marey.posing.curves import blurred, closed, monotone
+from marey.posing.curves import blurred, closed, monotone, turning_evenly
 
 STEPS = st.lists(st.floats(0.01, 3.0), min_size=1, max_size=8)
 
@@ -45,3 +45,16 @@ def test_a_closed_path_is_that_of_scipy(points: np.ndarray) -> None:
     whole = np.concatenate([points, points[:1]])
     expected = CubicSpline(np.linspace(0, 1, 7), whole, bc_type="periodic")(phase % 1.0)
     np.testing.assert_allclose(closed(points, phase), expected, atol=1e-9)
+
+
+def test_directions_turn_no_faster_than_allowed_and_end_as_they_did() -> None:
+    angles = np.radians(np.concatenate([np.zeros(8), [20.0, 110.0], np.full(8, 130.0)]))
+    ways = np.stack([np.sin(angles), np.zeros_like(angles), np.cos(angles)], axis=-1)
+    most = np.radians(28.0)
+    even = turning_evenly(ways, most)
+    turns = np.arccos(np.clip((even[1:] * even[:-1]).sum(-1), -1.0, 1.0))
+    assert turns.max() < most + 1e-3
+    assert turns.sum() == pytest.approx(angles[-1], abs=1e-3)
+    np.testing.assert_allclose(even[[0, -1]], ways[[0, -1]], atol=1e-6)
+    np.testing.assert_allclose(even[[3, -3]], ways[[3, -3]], atol=0.02)
+    assert turning_evenly(ways, np.pi) is ways

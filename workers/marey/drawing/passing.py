@@ -1,8 +1,8 @@
 """Bodies that pass through given postures: hips that go far down, hands and feet that go where they are put.
 
 Between postures the hips, the trunk and the feet follow monotone cubics, so that they neither overshoot nor stop at
-each; a foot that is put elsewhere on the floor steps there. What a posture does not set stays as in the idle, with its
-breath and sway.
+each; a foot that is put elsewhere on the floor steps there, one after the other. What a posture does not set stays as
+in the idle, with its breath and sway.
 """
 
 from __future__ import annotations
@@ -39,6 +39,7 @@ _LIFTED = 0.07  # an elbow below this height is lifted
 _STRAIGHT = 0.03  # metres; a knee that is bent by less points where the foot does
 _STEP = 0.03  # metres; a foot that goes farther over the floor is lifted
 _FLOOR = 0.2  # metres of an ankle
+_STEPS_S = 0.45  # seconds from which on both feet of a body step in turn; in less, it hops
 _SMOOTH, _SMOOTH_FEET = 1.1, 0.6  # frames
 
 
@@ -60,6 +61,10 @@ class _Posing:
         """Rows: left, up, forward."""
         self.bends = {side: self._bend(side) for side in LEGS}
         """Where the knees of the idle point, by side: outward, up and forward."""
+        self.places = {side: self._places(side) for side in LEGS}
+        """Ankles of each posture (N, 3), by side: outward, up and forward."""
+        self.clocks = self._clocks()
+        """Seconds (T,) at which each foot is, by side: while one steps, that of the other stands still."""
 
     def apply(self) -> None:
         self._trunk()
@@ -68,12 +73,14 @@ class _Posing:
         for side in ARMS:
             self._arm(side)
 
-    def _track(self, values: Sequence[Sequence[float] | Array] | Array, smooth: float = _SMOOTH) -> Array:
-        """Smooth path (T, K) through one row per posture."""
+    def _track(
+        self, values: Sequence[Sequence[float] | Array] | Array, smooth: float = _SMOOTH, *, clock: Array | None = None
+    ) -> Array:
+        """Smooth path (T, K) through one row per posture, at the seconds (T,) of a clock or of all frames."""
         rows = np.asarray(values, np.float64)
         if len(rows) == 1:
             return np.repeat(rows, len(self.t), axis=0)
-        path = monotone(self.times, rows, self.t)
+        path = monotone(self.times, rows, self.t if clock is None else clock)
         return blurred(path, smooth)
 
     def _floor(self, points: Array) -> Array:
@@ -136,13 +143,13 @@ class _Posing:
         rest, towards = own.mean(0), pointed.mean(0)
         feet = [posture.feet.get(side) for posture in self.postures]
         if any(feet):
-            flat = np.array([0.0, rest[1] - _ANKLE, 0.0])
-            raised = np.array([0.0, rest[1] + BONE_LENGTHS[toe] * normalize(towards)[1] - _TOE, 0.0])
-            places = np.array([foot.at + (raised if foot.toes else flat) if foot else rest for foot in feet])
-            free = self._track([[0.0 if foot else 1.0] for foot in feet])
-            put = self._track(places, _SMOOTH_FEET) + free * (own - rest)
-            put[:, 1] += self._steps(places, [foot is not None and foot.drags for foot in feet])
-            toes = self._track([normalize(np.array(foot.toes if foot and foot.toes else towards)) for foot in feet])
+            clock = self.clocks[side]
+            free = self._track([[0.0 if foot else 1.0] for foot in feet], clock=clock)
+            put = self._track(self.places[side], _SMOOTH_FEET, clock=clock) + free * (own - rest)
+            put[:, 1] += self._lifts(side)
+            toes = self._track(
+                [normalize(np.array(foot.toes if foot and foot.toes else towards)) for foot in feet], clock=clock
+            )
             toes = normalize(toes + free * (normalize(pointed) - normalize(towards)))
             joints[:, ankle] = self.origin + self._world(put, side)
             joints[:, toe] = joints[:, ankle] + BONE_LENGTHS[toe] * self._world(toes, side)
@@ -161,13 +168,48 @@ class _Posing:
         pointed = (toe - ankle) * np.array([1.0, 0.0, 1.0])
         return self._floor(self.origin + (aside + _STRAIGHT * normalize(pointed)).mean(0)) * self._outward(side)
 
-    def _steps(self, places: Array, drags: Sequence[bool]) -> Array:
-        """Extra height (T,) of a foot that is put elsewhere on the floor, if it does not drag there."""
+    def _places(self, side: str) -> Array:
+        """Where each posture has an ankle (N, 3); a foot that no posture sets is where the idle has it."""
+        _, _, ankle, toe = LEGS[side]
+        joints, sign = self.body.joints, self._outward(side)
+        rest = (self._floor(joints[:, ankle]) * sign).mean(0)
+        towards = ((joints[:, toe] - joints[:, ankle]) @ self.axes.T).mean(0)
+        flat = np.array([0.0, rest[1] - _ANKLE, 0.0])
+        raised = np.array([0.0, rest[1] + BONE_LENGTHS[toe] * normalize(towards)[1] - _TOE, 0.0])
+        feet = [posture.feet.get(side) for posture in self.postures]
+        return np.array([foot.at + (raised if foot.toes else flat) if foot else rest for foot in feet])
+
+    def _steps(self, side: str) -> Array:
+        """Metres (N - 1,) of the step of a foot to the place of each posture but the first; 0 where it makes none."""
+        places = self.places[side]
+        far = np.linalg.norm(np.diff(places, axis=0)[:, [0, 2]], axis=-1)
+        feet = [posture.feet.get(side) for posture in self.postures[1:]]
+        drags = np.array([foot is not None and foot.drags for foot in feet], bool)
+        low = np.maximum(places[1:, 1], places[:-1, 1]) < _FLOOR
+        return np.where((far > _STEP) & low & ~drags, far, 0.0)
+
+    def _clocks(self) -> dict[str, Array]:
+        """Seconds at which each foot is: where both step between two postures of a body on its feet, the one that goes
+        farther takes the first half of the time, and the other one the second."""
+        steps = np.stack([self._steps(side) for side in LEGS])
+        up = np.array([_STANDS if posture.pelvis is None else posture.pelvis[1] for posture in self.postures])
+        clocks = np.stack([self.t] * len(LEGS))
+        for k, lasts in enumerate(np.diff(self.times)):
+            if not steps[:, k].all() or lasts < _STEPS_S or max(up[k], up[k + 1]) < _LOW:
+                continue
+            now = (self.times[k] <= self.t) & (self.t < self.times[k + 1])
+            share = (self.t[now] - self.times[k]) / lasts
+            for place, foot in enumerate(np.argsort(-steps[:, k], kind="stable")):
+                clocks[foot, now] = self.times[k] + lasts * np.clip(2 * share - place, 0.0, 1.0)
+        return dict(zip(LEGS, clocks, strict=True))
+
+    def _lifts(self, side: str) -> Array:
+        """Extra height (T,) of a foot that steps."""
         lift = np.zeros(len(self.t))
-        for k, far in enumerate(np.linalg.norm(np.diff(places, axis=0)[:, [0, 2]], axis=-1)):
-            if far > _STEP and not drags[k + 1] and max(places[k, 1], places[k + 1, 1]) < _FLOOR:
-                within = np.clip((self.t - self.times[k]) / (self.times[k + 1] - self.times[k]), 0.0, 1.0)
-                lift += min(0.12, 0.05 + 0.2 * far) * np.sin(np.pi * within)
+        for k, far in enumerate(self._steps(side)):
+            if far:
+                within = (self.clocks[side] - self.times[k]) / (self.times[k + 1] - self.times[k])
+                lift += min(0.12, 0.05 + 0.2 * far) * np.sin(np.pi * np.clip(within, 0.0, 1.0))
         return blurred(lift, _SMOOTH_FEET)
 
     def _arm(self, side: str) -> None:

@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from marey.drawing.gesture import SIDES, Gesture
 from marey.drawing.postures import Point
+from marey.motion.filters import smooth_above
 from marey.motion.rotations import cross, from_rotvec, normalize, rotate
 from marey.posing.bones import two_bones
-from marey.posing.curves import blurred, monotone
+from marey.posing.curves import blurred, monotone, turning_evenly
 from marey.posing.limbs import BONE_LENGTHS, CARRIED, FPS, GRAVITY, LEVEL
 from marey.posing.standing import ARMS, LEGS, OTHER_SIDE, SIGN, StandingBody
 
@@ -32,6 +33,7 @@ _WRIST, _ANKLE, _TOE, _BEND = 0.035, 0.045, 0.012, 0.06  # lowest metres of join
 _REACH, _LEAST = 0.985, 0.17  # share of the length of an arm; metres from shoulder to wrist
 _PARTS = 6  # parts of the way to a pose that is fallen into
 _SMOOTH = 0.9  # frames
+_TURN = np.radians(28.0)  # by which a foot turns from one frame to the next at most
 _MASSES = {0: 0.16, 3: 0.1, 6: 0.1, 9: 0.16, 15: 0.08, 18: 0.03, 19: 0.03, 20: 0.02, 21: 0.02}
 _LEG_MASSES = {1: 0.05, 2: 0.05, 4: 0.06, 5: 0.06, 7: 0.04, 8: 0.04}
 """Shares of the mass of a body at its joints."""
@@ -248,6 +250,30 @@ def _pelvis_axes(axes: Array, tilt: Array) -> Array:
 
 def _solve_leg(joints: Array, idle: Array, side: str, motion: WholeMotion, frames: tuple[Array, Array, Array]) -> None:
     hip, knee, ankle, toe = LEGS[side]
+    target, toes = _foot(joints, idle, side, motion, frames)
+    across = normalize(frames[1][:, 0])
+    outward = motion.splay[:, None] * across * SIGN[side]
+    lengths = (BONE_LENGTHS[knee], BONE_LENGTHS[ankle])
+
+    def solve() -> None:
+        pole = normalize(cross(normalize(target - joints[:, hip]), across)) + outward
+        joints[:, knee], joints[:, ankle] = two_bones(joints[:, hip], target, pole, lengths)
+
+    solve()
+    toes = _over_floor(toes, joints[:, ankle, 1], BONE_LENGTHS[toe])
+    turned = turning_evenly(toes, _TURN)
+    if turned is not toes:  # on its way a foot may point down: the ankle makes room for it
+        sunk = _TOE - joints[:, ankle, 1] - BONE_LENGTHS[toe] * turned[:, 1]
+        target[:, 1] += smooth_above(np.maximum(sunk, 0.0), _SMOOTH)
+        solve()
+    joints[:, toe] = joints[:, ankle] + BONE_LENGTHS[toe] * turned
+
+
+def _foot(
+    joints: Array, idle: Array, side: str, motion: WholeMotion, frames: tuple[Array, Array, Array]
+) -> tuple[Array, Array]:
+    """Where an ankle goes (T, 3), over the floor, and where the toes point (T, 3)."""
+    _, _, ankle, toe = LEGS[side]
     axes, pelvis, origin = frames
     sign = np.array([SIGN[side], 1.0, 1.0])
     target, toes = np.zeros((len(joints), 3)), np.zeros((len(joints), 3))
@@ -262,16 +288,16 @@ def _solve_leg(joints: Array, idle: Array, side: str, motion: WholeMotion, frame
         target += share * point
         toes += share * normalize(pointed)
     target[:, 1] = np.maximum(target[:, 1], _ANKLE)
-    lengths = (BONE_LENGTHS[knee], BONE_LENGTHS[ankle])
-    across = normalize(pelvis[:, 0])
-    pole = normalize(cross(normalize(target - joints[:, hip]), across)) + motion.splay[:, None] * across * sign[0]
-    joints[:, knee], joints[:, ankle] = two_bones(joints[:, hip], target, pole, lengths)
-    toes = normalize(toes)
-    least = np.clip((_TOE - joints[:, ankle, 1]) / BONE_LENGTHS[toe], -1.0, 0.9)
-    toes[:, 1] = np.maximum(toes[:, 1], least)
+    return target, normalize(toes)
+
+
+def _over_floor(toes: Array, ankles: Array, length: float) -> Array:
+    """Directions (T, 3) of feet of a length that do not go into the floor from ankles at heights (T,)."""
+    toes = toes.copy()
+    toes[:, 1] = np.maximum(toes[:, 1], np.clip((_TOE - ankles) / length, -1.0, 0.9))
     level = np.linalg.norm(toes[:, [0, 2]], axis=-1)
     toes[:, [0, 2]] *= (np.sqrt(1 - np.minimum(toes[:, 1] ** 2, 1.0)) / np.maximum(level, 1e-6))[:, None]
-    joints[:, toe] = joints[:, ankle] + BONE_LENGTHS[toe] * normalize(toes)
+    return normalize(toes)
 
 
 def _solve_arm(joints: Array, side: str, motion: WholeMotion, frames: tuple[Array, Array]) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.motion.filters import smooth
+from marey.motion.rotations import normalize
 
 Array = NDArray[np.floating]
 
@@ -76,3 +77,28 @@ def closed(points: Array | Sequence[Sequence[float]], phase: Array) -> Array:
 def blurred(values: Array, sigma: float) -> Array:
     """Gaussian filter over axis 0 of values (T, …), ends repeated; `sigma` in frames."""
     return smooth(values.reshape(len(values), -1), sigma, cut=CUT).reshape(values.shape)
+
+
+SPREADS = 200
+"""Rounds at most in which a fast turn is spread over the frames before and after it."""
+
+
+def turning_evenly(directions: Array, most: float) -> Array:
+    """Unit vectors (T, 3) that go the same way as others and turn by at most so many radians from one to the next: a
+    faster turn begins earlier and ends later. They are returned themselves if none is faster."""
+    before, after = directions[:-1], directions[1:]
+    turns = np.arccos(np.clip((before * after).sum(-1), -1.0, 1.0))
+    if turns.max(initial=0.0) <= most:
+        return directions
+    spread = turns.copy()
+    for _ in range(SPREADS):
+        over = np.maximum(spread - most, 0.0)
+        spread -= over
+        shared = np.concatenate([over[:1], over, over[-1:]]) / 2  # beyond the ends it comes back
+        spread += shared[:-2] + shared[2:]
+    along, at = (np.concatenate([[0.0], np.cumsum(each)]) for each in (turns, spread))
+    k = np.clip(np.searchsorted(along, at, side="right") - 1, 0, len(turns) - 1)
+    turn = np.maximum(turns[k], 1e-9)
+    share = np.clip((at - along[k]) / turn, 0.0, 1.0)
+    weights = (np.sin((1 - share) * turn) / np.sin(turn), np.sin(share * turn) / np.sin(turn))
+    return normalize(weights[0][:, None] * before[k] + weights[1][:, None] * after[k])

@@ -30,12 +30,13 @@ from marey.generation.shots.freezing import AS_BEFORE, freezes, frozen
 from marey.generation.shots.going_on import is_way, without_halt, without_wait
 from marey.generation.shots.headings import JoinedTurn, heading_change, with_whole_turns
 from marey.generation.shots.levels import lifted, raised_rows
+from marey.generation.shots.lifted_steps import with_steps
 from marey.generation.shots.raised_arms import FIGHTING, RAISING, STEPPING_ASIDE, TURNING, guarded, kept_arms
 from marey.generation.shots.way_lengths import WayRow, as_long_as, metres_between, ways_back
 from marey.generation.shots.windows import CONTEXT, Float32, FrameGap, Window, crossfaded, fill, most_frames
 from marey.generation.timed import TimedText, cut_of, part_seed
 from marey.items.timeline import TIMELINE_HINT, no_timelines
-from marey.motion.features import FeatureLayout
+from marey.motion.features import FeatureLayout, HeadingLayout
 from marey.motion.skeleton import HUMANML3D
 from marey.text.features import TextFeatures
 from marey.vocabulary.bearing_words import stated_bearings
@@ -526,6 +527,8 @@ class _Timeline:
             frames = with_whole_turns(frames, layout, turns)
         if self.open and layout.skeleton.name == HUMANML3D.name:
             frames = self._far(frames, layout)
+        if isinstance(layout, HeadingLayout) and layout.skeleton.name == HUMANML3D.name:
+            frames = with_steps(frames, layout, [(each.part.start, each.part.end) for each in self.transitions])
         timeline = zip(self.timeline, self.rows, strict=True)
         changed = tuple(replace(timed, changes=row.changes) for timed, row in timeline)
         return TimelineMotion(frames.astype(np.float32), changed)
