@@ -19,7 +19,7 @@ from marey.vocabulary.word_lists import load_word_lists
 MOST_TITLE_WORDS = 4
 """Words of a title before a colon."""
 _SIGNS = re.compile(
-    r"\s*(?:<)?(?:[-=]{1,2}>|[→⇒➔➜»])\s*|\s+[/|+•·▪]\s+|\s*(?:…|\.{3,})\s+(?=[^\W\d_]{2})",
+    r"\s*(?:<)?(?:[-=]{1,2}>|[→⇒➔➜»])\s*|\s+(?:>+|[/|+•·▪])\s+|\s*(?:…|\.{3,})\s+(?=[^\W\d_]{2})",
 )
 """Signs between clauses."""
 _DASHES = re.compile(r"^\s*-\s+(?=[^\W\d_])|\s-\s+(?=[^\W\d_])")
@@ -28,6 +28,26 @@ _SLUG_LINE = re.compile(
     r"^(?:INT|EXT)\b[^a-z]*?\b(?:DAY|NIGHT|MORNING|EVENING|DUSK|DAWN|CONTINUOUS|LATER)\b[.:,\s-]*(?=[^\W\d_])"
 )
 """Place and time of a scene in a screenplay: "INT. OFFICE - DAY."."""
+_LABEL = re.compile(
+    r"""^(?:(?:scene|shot|take|cam(?:era)?|beat|clip|frame|seq(?:uence)?|cut|angle|panel|cue|part)
+    (?:\ ?\#?(?:\d{1,4}[a-z]?|[a-z]|one|two|three|four|five))?(?:,\ )?)+(?:\s*:|\s[-–—])\s+(?=[^\W\d_])""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""The number of a shot or a scene in a list: "SHOT B:", "Scene 4, take 2 -"."""
+_SUMMARY = re.compile(
+    r":\s+(?:(?:an?|the|just|simple|one)\s)+(?:[\w-]+\s){0,3}?(?:dance|routine|combo|combination|drill|exercise|sequence"
+    r"|workout|move|step)\W*$",
+    re.IGNORECASE,
+)
+"""A name behind a list, which says again what it is: "step left, step right, clap: a simple party dance"."""
+_PURPOSE = re.compile(
+    r"""(?:,\s+|\s+)(?:so\ that|in\ order\ that|lest|(?:so\ as|in\ order)(?=\ not\ to)
+    |so(?=\ (?:he|she|they|it|nobody|no\ one|nothing)\ [a-z]))\s(?P<aim>[^,.;]+?)
+    (?=\s*(?:$|[,.;!])|\s+(?:and\s+)?then\b)""",
+    re.IGNORECASE | re.VERBOSE,
+)
+_NOT_DONE = re.compile(r"\b(?:not|never|no|nobody|nothing|cannot|without)\b|n't\b", re.IGNORECASE)
+_BY_THEMSELVES = re.compile(r"(?:he|she|they|it)\b", re.IGNORECASE)
 _TITLE = re.compile(r"^(?P<title>[^:.;,!?]{2,80}):\s+(?P<said>\S.*)$", re.DOTALL)
 _WISH = re.compile(
     r"""^(?:(?:ok(?:ay)?|hi|hello|hey|please|so|now)\ )*
@@ -93,8 +113,17 @@ def without_asides(prompt: str) -> str:
     text = WHOLE.sub("", prompt).strip(" ,;-–—(") or prompt
     text = _DASHES.sub(" • ", text).strip() if text.startswith("- ") or prompt.startswith("- ") else text
     text = _SIGNS.sub(", then ", _BULLET.sub("", text)) if _SIGNS.search(text) or _BULLET.match(text) else text
-    text = _without_scene(_without_title(_SLUG_LINE.sub("", text.strip(" ,"))))
+    text = _LABEL.sub("", _SLUG_LINE.sub("", text.strip(" ,")))
+    text = _PURPOSE.sub(_without_aim, _without_scene(_without_title(text)))
+    text = _SUMMARY.sub("", text) if _LIST_AHEAD.search(text.partition(":")[0]) else text
     return _BELONGS.sub(" ", text)
+
+
+def _without_aim(found: re.Match[str]) -> str:
+    """Return nothing for what a movement is done for; an aim that is itself a movement of who acts stays."""
+    aim = found["aim"]
+    moves = _BY_THEMSELVES.match(aim) and not _NOT_DONE.search(aim) and named_actions(aim) - {STANDING}
+    return found[0] if moves else ""
 
 
 def _without_title(text: str) -> str:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 from marey.text.action_reader import OUTSIDE
 from marey.text.clause_parts import begins_with_verb, is_on_other_side, only_named, parts_in_time
+from marey.vocabulary.bearing_words import is_done_at_once, stated_bearings
 from marey.vocabulary.gazes import without_gaze
 from marey.vocabulary.scope import STANDING
 
@@ -27,6 +28,7 @@ _JOINING = re.compile(
     re.IGNORECASE,
 )
 """Words and signs at the beginning of a clause that join it to others."""
+_FRONTED = re.compile(r"^.*?(?=\b(?:as|while|whilst)\b)", re.IGNORECASE)
 _MANNER = re.compile(
     r"in an? (?:\w+ )?(?:crouch|squat|stoop|hunch|trot|jog|run|sprint|walk|pose|stance|way)\b", re.IGNORECASE
 )
@@ -34,7 +36,7 @@ _MANNER = re.compile(
 _FROM = re.compile(r"\W*from\ (?:a\ )?(?:ly|sitt|kneel|crouch|squatt|sleep|seat|prone|supine)\w*\b", re.IGNORECASE)
 """Beginning of words of the posture from which someone rises: "from lying on his back"."""
 _WITH = re.compile(
-    r"""\W*(?:(?:with|without|like|as\ if|using|behind|beside|above)\b(?!\ that\b)
+    r"""\W*(?:(?P<unit>\w+)\ by\ (?P=unit)\b|(?:with|without|like|as\ if|using|behind|beside|above)\b(?!\ that\b)
     |(?:\d+|an?|one|two|three|four|five|six|seven|eight|nine|ten|several|a\ few)\ (?:\w+\ )?
     (?:strokes?|times?|blows?|hits?|knocks?|swings?|beats?|reps?|repetitions?|rounds?|turns?)\W*$)""",
     re.IGNORECASE | re.VERBOSE,
@@ -112,8 +114,11 @@ class ReadClause:
 
 
 def without_joints(text: str) -> str:
-    """Return a clause without the words that join it to others: "and then he bows," is "he bows"."""
+    """Return a clause without the words that join it to others: "and then he bows," is "he bows"; "as he runs, he
+    waves" is one."""
     bare = _JOINING.sub("", text).strip(" ,.;:→>-(")
+    if is_done_at_once(text) and not is_done_at_once(bare):
+        bare = _FRONTED.sub("", text).strip(" ,.;:→>-(")
     return bare or text.strip()
 
 
@@ -178,7 +183,15 @@ def comes_with(before: str, text: str) -> bool:
     tossing the ball"; "walking in, | sitting down" are two."""
     if _WITH.match(text) or (_HELD.match(text) and begins_with_verb(_last_clause(before))):
         return True
-    return bool(_MEANWHILE.match(text)) and not re.search(r"\b\w{2,}ing\b", before) and only_named(text) is None
+    if not _MEANWHILE.match(text) or re.search(r"\b\w{2,}ing\b", before):
+        return False
+    return only_named(text) is None or _begins_with_manner(text)
+
+
+def _begins_with_manner(text: str) -> bool:
+    """Return True if a text begins with a way to move, not with a movement: "staggering under the load"."""
+    first = text.strip(" ,;").split()[0].lower()
+    return any(each.bearing.is_manner and each.first == first for each in stated_bearings(text))
 
 
 def _last_clause(text: str) -> str:

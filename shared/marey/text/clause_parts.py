@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterator
 
 from marey.text.action_reader import named_actions
+from marey.vocabulary.bearing_words import is_done_at_once
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.lengths import verb_forms
 
@@ -104,6 +105,8 @@ def _parts(text: str, listed: bool) -> Iterator[tuple[str, str]]:
         left, right = text[begin : sign.start()], text[sign.end() :]
         if not begins_with_verb(right) and (sign["and"] or not (_is_short_name(right) and _COMMAND.match(left))):
             continue  # before the names are looked for, which takes longer
+        if is_done_at_once(f"{left}, {_first(right)}"):
+            continue
         action = only_named(left) or ""
         after = only_named(_first(right)) or only_named(_CLAUSE.split(right)[0]) or ""
         if not action or not after:

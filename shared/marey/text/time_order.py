@@ -68,13 +68,12 @@ _CARRIES_ON = re.compile(
     re.IGNORECASE,
 )
 """Words of who does something again, or still: "stumbles, then carries on limping"."""
-_WAVES_ON_A_WAY = re.compile(
-    r"""\bwav(?P<s>es|e)\b(?P<how>(?:\ (?!while\b|as\b)[\w-]+){0,6})\ while
-    \ (?P<way>(?:walk|runn|jogg|march|stroll|limp)ing)\b
-    (?P<where>[^,.;]*)""",
+_ENDS_BY = re.compile(
+    r",?\ (?:and\ )?(?:then\ |finally\ )?(?:ends?|finish(?:es)?|clos(?:es|e)|concludes?)\ (?:up\ |off\ )?(?:by|with)"
+    r"\ (?P<last>[a-z]+ing\b(?:\ [^,.;]+)?)",
     re.IGNORECASE | re.VERBOSE,
 )
-"""A wave on a way, which is told behind it: "waves while walking ahead"."""
+"""An action done last, told as an end: "marches ahead and ends by saluting"."""
 _COUNTED_BEFORE_TURN = re.compile(
     rf"""(?P<steps>\b{_GAIT}(?:e?s)?\b[^,.;]*\bsteps?\b[^,.;]*?)(?:,?\ (?:and\ )?(?:then\ )?|,\ )
     (?P<turn>turns?\ (?:\w+ly\ )?(?:to\ (?:the|his|her)\ )?(?:left|right|around))(?:,?\ (?:and\ )?(?:then\ )?|,\ )
@@ -83,11 +82,18 @@ _COUNTED_BEFORE_TURN = re.compile(
 )
 """Counted steps, a turn and the way behind it: "walks two steps, turns left and walks on"."""
 _IN_TURN = re.compile(
-    r"\b(?P<verb>turns?|pivots?|sidesteps?|side steps?|hops?|kicks?)(?P<how> [^,.;]*\b(?:left|right)\b[^,.;]*),"
+    r"\b(?P<verb>turns?|pivots?|sidesteps?|side steps?|steps?|hops?|kicks?|slash(?:es)?|cuts?"
+    r"|punch(?:es)?)(?P<how> [^,.;]*\b(?:left|right)\b[^,.;]*),"
     r" (?:and )?(?=(?P=verb)\b[^,.;]*\b(?:left|right)\b)",
     re.IGNORECASE,
 )
 """An action on one side before the same on the other: "turns left, turns right"."""
+_PUNCH_BEFORE = re.compile(
+    r"(?P<punch>\b(?:jab|cross|hook|uppercut)s?), "
+    r"(?=(?:[\w-]+ ){0,2}?(?:kick|knee|elbow|block|duck|dodge|weave|sweep)s?\b)",
+    re.IGNORECASE,
+)
+"""A punch by its name before what is none, in a list: "jab, cross, roundhouse kick"."""
 _AS_SOON_AS = re.compile(r"\bas soon as ", re.IGNORECASE)
 _NUMBER = re.compile(r"(?:^|(?<=[\s,;.]))\(?(?P<number>\d{1,2})[.):]\s+(?=[^\W\d])")
 LEAST_NUMBERS = 2
@@ -121,8 +127,8 @@ def in_time_order(prompt: str) -> str:
     text = _FALLS_AND_CLIMBS.sub(lambda up: f"{up['falls']}get{up['s'] or ''} up", text)
     text = text if _COLD.search(text) else _FREEZES.sub(lambda it: f"{it['joint']}stand{it['s'] or ''} still", text)
     text = _CARRIES_ON.sub(_carries_on, text)
-    text = _COUNTED_BEFORE_TURN.sub(_steps_and_turn, _WAVES_ON_A_WAY.sub(_waving, text))
-    text = _IN_TURN.sub(r"\g<verb>\g<how>, then ", text)
+    text = _COUNTED_BEFORE_TURN.sub(_steps_and_turn, _ENDS_BY.sub(_ends, text))
+    text = _IN_TURN.sub(r"\g<verb>\g<how>, then ", _PUNCH_BEFORE.sub(r"\g<punch>, then ", text))
     return _OPPOSITE.sub(_turned, _DOER.sub(_does, text))
 
 
@@ -175,10 +181,10 @@ def _trips(found: re.Match[str]) -> str:
     return f"fall{found['s'] or ''} forward"
 
 
-def _waving(found: re.Match[str]) -> str:
-    """Return a way with a wave beside it."""
-    way = _verbs_of_gerunds().get(found["way"].lower(), "walk")
-    return f"{third_person(way) if found['s'] == 'es' else way}{found['where']} while waving{found['how']}"
+def _ends(found: re.Match[str]) -> str:
+    """Return what is done last behind what comes before it."""
+    last = _does_so(found["last"])
+    return found[0] if last is None else f", then {last}"
 
 
 def _steps_and_turn(found: re.Match[str]) -> str:

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from marey.text.clause_order import comes_with, is_end, without_joints
 from marey.text.clause_parts import begins_with_verb, goes_on, is_on_other_side
 from marey.text.sequence_reader import TURNS, ReadMovement
-from marey.vocabulary.bearing_words import stated_bearings
+from marey.vocabulary.bearing_words import is_done_at_once, stated_bearings
 from marey.vocabulary.counts import STEPPING, stated_count
 from marey.vocabulary.gazes import only_gaze
 from marey.vocabulary.in_place import goes_in_place
@@ -40,7 +40,12 @@ def clauses_apart(text: str) -> list[str]:
     for part in parts:
         said = without_joints(part)
         belongs = joined and (
-            comes_with(joined[-1], said) or is_end(said) or goes_on(said) or _HERE.match(said) or only_gaze(said)
+            (is_done_at_once(f"{joined[-1]}, {said}") and not is_done_at_once(joined[-1]))
+            or comes_with(joined[-1], said)
+            or is_end(said)
+            or goes_on(said)
+            or _HERE.match(said)
+            or only_gaze(said)
         )
         if belongs:
             joined[-1] = f"{joined[-1]}, {part}"

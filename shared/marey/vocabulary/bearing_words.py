@@ -3,32 +3,30 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
-from marey.vocabulary.bearings import (
-    UNLESS,
-    Side,
-    StatedBearing,
-    bearing_macros,
-    bearing_table,
-    bearing_words,
-    each_once,
+from marey.vocabulary.bearing_patterns import (
+    ALL,
+    DOES,
+    SEEMS,
+    bearing_patterns,
+    doers,
+    person_ahead,
+    unless_beside,
+    walking_forms,
 )
+from marey.vocabulary.bearings import Side, StatedBearing, each_once
 from marey.vocabulary.counts import stated_strokes, strokes_before, strokes_behind
 from marey.vocabulary.held_poses import held_words
-from marey.vocabulary.inflection import gerund, third_person, verb_forms
+from marey.vocabulary.inflection import verb_forms
+from marey.vocabulary.meanwhile import JOINS_AHEAD, WAYS, is_on_a_way, spans_at_once
 from marey.vocabulary.word_lists import load_word_lists
 
 KEPT_READINGS = 1024
 """Prompts whose words are kept as read: reader, scope and manifest ask for the same ones."""
-_WALK, _LOAD = "walk", " with a load"
-_PERSON = "person"
-_ALL = r"a|an|the|my|his|her|this|that|one|some"
-_VERY = r"(?:(?:very|really|so|rather|quite|extremely|slightly|somewhat|too|visibly|clearly|obviously) )*"
-_SEEMS = r"(?:look|feel|seem|appear)(?:s|ed|ing)?"
-_BE = rf"(?:(?:who|that|which) )?(?:is|are|was|were|being|{_SEEMS}(?: to be)?) "
+_LOAD, _PERSON = " with a load", "person"
 _JOINT = re.compile(
     r"(?:^|(?<=\W))(?:(?:and|then|while|as|but|first|who|that|with)\s+)*(?:(?:he|she|they|it)\s+)?(?:(?:is|are)\s+)?$",
     re.IGNORECASE,
@@ -53,7 +51,7 @@ _UNTIDY = tuple(
     re.compile(pattern)
     for pattern in (
         r"[\s,;]*\b(?:(?:and|but|while|who|that) )?(?:(?:he|she|they|it) )?"
-        rf"{_SEEMS}(?: (?:to be|like|very|really|so|quite|rather|a (?:bit|little)))*\s*(?=[,.;!?]|$)",
+        rf"{SEEMS}(?: (?:to be|like|very|really|so|quite|rather|a (?:bit|little)))*\s*(?=[,.;!?]|$)",
         r"\s+(?=[\s,.;!?])",
         r",\s*(?=[,.;])",
         r"^[\s,;.]+(?:and\s+)?",
@@ -63,7 +61,7 @@ _UNTIDY = tuple(
 )
 """Verbs of what is seen in a body without what is seen, spaces and commas that stand twice or at the ends, words that
 join nothing, and "an" before a consonant."""
-_SUBJECT = re.compile(rf"\b(?:(?:{_ALL}) (?:(?!(?:{_ALL}) )[\w,-]+ ){{0,4}}|who )$")
+_SUBJECT = re.compile(rf"\b(?:(?:{ALL}) (?:(?!(?:{ALL}) )[\w,-]+ ){{0,4}}|who )$")
 _NO_ACTION = frozenset(
     [
         "a",
@@ -107,7 +105,7 @@ _DOER = re.compile(
 )
 """A noun that names a person by what they do: "a violinist"."""
 _ARTICLE = re.compile(r"\b(?:a|an|the|his|her|their|its) (\w+ )?$")
-_NOUN_PHRASE = re.compile(rf"(?:\b(?:{_ALL}) (?:(?!(?:{_ALL}) )\w+ )?)?$")
+_NOUN_PHRASE = re.compile(rf"(?:\b(?:{ALL}) (?:(?!(?:{ALL}) )\w+ )?)?$")
 _MANNER = re.compile(
     r" (?:walk|shuffle|gait|style|run|idle|pose|movement|way)\b(?! (?:toward|forward|a|the|in|on|over))"
 )
@@ -137,7 +135,6 @@ _OVER_AND_OVER = re.compile(
 _HOLDING = re.compile(r"(?:,? and|,? then|,| -)? (?:(?:he|she|they) )?(?=hold|keep|maintain|for )")
 """Words between those of a gesture and those that have its pose held."""
 _HANDED = re.compile(r"\b(?:left|right)[- ]handed\b")
-_PRONOUNS = frozenset(["he", "she", "they", "it", "i", "you", "we", "someone", "somebody"])
 _BRINGING = frozenset(
     [
         "cross",
@@ -168,19 +165,10 @@ _BRINGING = frozenset(
     ]
 )
 """Verbs by which arms come to where they are held: what is told before and after is done before and after."""
-_GAITS = "walk|run|jog|stroll|march|idle|stance|pose|gait|strut|stride|shuffle|standing|walking|running"
-"""Nouns of ways before which an adjective is one of the person: "sad walk"."""
-_DOES = "does"
-"""Group of the words that ask for a bearing, behind the people of whom they do so."""
-_GAIT = re.compile(r"([\w|-]+)(.*)", re.DOTALL)
 _POSTURES = re.compile(r"\b(?:kneel\w*|knelt|crouch\w*|squat\w*|sit|sits|sitting|sat|seated|knees?)\b")
-_WAYS = (
-    r"(?:walk(?:s|ing|ed)?|runs?|running|jog(?:s|ging)?|sprint(?:s|ing)?|stroll(?:s|ing)?|march(?:es|ing)?|turns?|turning"
-    r"|(?:side)?steps?|back(?:s|ing)|advanc(?:e|es|ing)|strafe?s?|strafing|creeps?|creeping|paces?|pacing)"
-)
 _WHILE = re.compile(r"\b(?:while|whilst|as)\s+(?:(?:he|she|they)\s+)?(?:(?:is|are)\s+)?$")
-_WAY = re.compile(rf"\b{_WAYS}\b")
-_BORNE = rf"(?:{_WAYS}|stand(?:s|ing)?|kneel(?:s|ing)?|crouch(?:es|ing)?|idles?|climb(?:s|ing)?|limp(?:s|ing)?)"
+_WAY = re.compile(rf"\b{WAYS}\b")
+_BORNE = rf"(?:{WAYS}|stand(?:s|ing)?|kneel(?:s|ing)?|crouch(?:es|ing)?|idles?|climb(?:s|ing)?|limp(?:s|ing)?)"
 _BORNE_BEFORE = re.compile(rf"\b{_BORNE}\b[^.;]*$")
 _BORNE_JUST_BEFORE = re.compile(rf"\b{_BORNE} (?:cycle )?$")
 _BORNE_AFTER = re.compile(rf"^\W*(?:\w+ly )?(?!\w+ing\b){_BORNE}\b")
@@ -188,12 +176,22 @@ _BORNE_AFTER = re.compile(rf"^\W*(?:\w+ly )?(?!\w+ing\b){_BORNE}\b")
 
 @dataclass(frozen=True)
 class _Words:
-    """Words of a prompt that ask for a bearing, and those that stand in their place."""
+    """Words of a prompt that ask for a bearing, and those that stand in their place.
+
+    Attributes:
+        start, end: of these words, with those that join them to others.
+        stated: the bearing.
+        instead: words in their place.
+        own: first of the words that ask for it, where the prompt says that it comes at the same time as a way.
+        at_once: they are left out with the words that join both.
+    """
 
     start: int
     end: int
     stated: StatedBearing
     instead: str = ""
+    own: int | None = None
+    at_once: bool = False
 
     @property
     def is_gerund(self) -> bool:
@@ -205,10 +203,8 @@ class _Words:
         """True if something is done in them: "salutes", "crosses his arms"; not "with his arms crossed"."""
         bearing, first = self.stated.bearing, self.stated.first
         arms = bool(bearing.arms) and not (bearing.pace or bearing.gait or bearing.roll)
-        return (
-            not self.instead
-            and not self.stated.whole
-            and (bearing.gesture or bearing.work or (arms and first in _event_verbs()))
+        return not (self.instead or self.stated.whole or self.own is not None) and (
+            bearing.gesture or bearing.work or (arms and first in _event_verbs())
         )
 
 
@@ -238,8 +234,17 @@ class BarePrompt:
 
     def written(self, start: int, end: int) -> str:
         """Return the words of the prompt of which these characters of the text are left."""
-        begin = 0 if start == 0 else self.places[start]
-        return self.prompt[begin:] if end >= len(self.text) else self.prompt[begin : self.places[end]]
+        begin = 0 if start == 0 else self._edge(start)
+        return self.prompt[begin:] if end >= len(self.text) else self.prompt[begin : self._edge(end)]
+
+    def _edge(self, at: int) -> int:
+        """Return where in the prompt a clause begins that begins here in the text; a word left out that joins it to a
+        bearing of the same time is its own: "stops, and | as he turns, he nods"."""
+        place = self.places[at]
+        if at == 0:
+            return place
+        joint = JOINS_AHEAD.search(self.prompt[self.places[at - 1] + 1 : place])
+        return place if joint is None else place - len(joint[0])
 
     def fits(self, action: str) -> bool:
         """Return True if one of the bearings at least can be shown beside an action of the vocabulary."""
@@ -258,6 +263,12 @@ def stated_bearings(prompt: str) -> tuple[StatedBearing, ...]:
         prompt: as a user typed it.
     """
     return each_once(each.stated for each in _found(prompt))
+
+
+def is_done_at_once(text: str) -> bool:
+    """Return True if a text says in two clauses what a body does, and which bearing it has in it: "as he runs, he
+    waves"."""
+    return any(each.at_once for each in _found(text))
 
 
 def parts_by_gestures(prompt: str) -> tuple[str, ...]:
@@ -312,12 +323,16 @@ def _without(prompt: str, found: Sequence[_Words]) -> tuple[str, tuple[int, ...]
     for each in found:
         if each.start < at:
             continue
-        begin = each.start if each.instead else at + _joint(prompt[at : each.start])
+        whole = each.instead or each.at_once
+        begin = at + _joint(prompt[at : each.start])
+        ahead = each.own is not None and each.end <= each.own  # the word that joins two clauses alone
+        if each.instead or ahead or (each.at_once and _says_more(kept + prompt[at:begin])):
+            begin = each.start
         kept, places = kept + prompt[at:begin], [*places, *range(at, begin)]
         kept, places = kept + each.instead, [*places, *[each.start] * len(each.instead)]
         at = each.end
         joined = _JOINED.match(prompt[at:])
-        if joined is not None and not each.instead and not _says_more(kept):
+        if joined is not None and not whole and not _says_more(kept):
             length = len(kept.rstrip())
             kept, places, at = f"{kept[:length]} ", [*places[:length], each.start], at + joined.end()
     return _tidied(kept + prompt[at:], [*places, *range(at, len(prompt))])
@@ -342,8 +357,8 @@ def _says_more(text: str) -> bool:
     words = set(re.findall(r"[a-z']+", _HANDED.sub("", text.lower())))
     said = words - lists.people - lists.determiners - lists.skipped - lists.auxiliaries - _NO_ACTION
     if len(said) > 1:
-        return not (_doers().match(text.lower()) or _DOER.match(text.lower()))
-    return bool(said) and not (_doers().match(text.lower()) or _DOER.search(text.lower()))
+        return not (doers().match(text.lower()) or _DOER.match(text.lower()))
+    return bool(said) and not (doers().match(text.lower()) or _DOER.search(text.lower()))
 
 
 @lru_cache(maxsize=KEPT_READINGS)
@@ -354,9 +369,15 @@ def _found(prompt: str) -> tuple[_Words, ...]:
     if len(text) != len(prompt):  # lower case of another length: no language that these words are of
         return ()
     for each in sorted(_matches(text), key=lambda words: (words.start, -words.end, not words.instead)):
-        if (not spans or each.start >= spans[-1].end) and not _DENIED.search(text[: each.start]):
+        apart = not spans or each.start >= spans[-1].end
+        if (apart or _is_of_who(each, spans[-1])) and not _DENIED.search(text[: each.start]):
             spans.append(each)
     return tuple(_of_zombies(spans))
+
+
+def _is_of_who(found: _Words, joined: _Words) -> bool:
+    """Return True if words are said of the person who is left out with other words: "runs, the tired man waves"."""
+    return joined.own is not None and found.end <= joined.own
 
 
 def _of_zombies(spans: Sequence[_Words]) -> Iterator[_Words]:
@@ -368,11 +389,12 @@ def _of_zombies(spans: Sequence[_Words]) -> Iterator[_Words]:
 
 
 def _matches(text: str) -> Iterator[_Words]:
-    for name, kind, pattern in _patterns():
+    for name, kind, pattern in bearing_patterns():
         for match in pattern.finditer(text):
-            if name in _unless() and _unless()[name].search(text):
+            if name in unless_beside() and unless_beside()[name].search(text):
                 break
-            yield from (_held(text, _counted(text, each)) for each in _words_of(text, name, kind, match))
+            for each in _words_of(text, name, kind, match):
+                yield from _with_joints(text, _held(text, _counted(text, each)), only=kind == "meanwhile")
 
 
 def _held(text: str, found: _Words) -> _Words:
@@ -384,6 +406,25 @@ def _held(text: str, found: _Words) -> _Words:
     if hold is None:
         return found
     return replace(found, end=hold[1], stated=replace(found.stated, hold_s=hold[0]))
+
+
+def _with_joints(text: str, found: _Words, *, only: bool) -> Iterator[_Words]:
+    """Yield words, with those that join them to a way or a posture at the same time.
+
+    Args:
+        text: in lower case.
+        found: words of a bearing.
+        only: they ask for it only at the same time as a way.
+    """
+    arms = found.stated.bearing.gesture or found.stated.bearing.arms
+    may_join = not found.instead and bool(only or arms)
+    joined = spans_at_once(text, found.start, found.end) if may_join else ()
+    for start, end in joined:
+        yield replace(found, start=start, end=end, own=found.start, at_once=True)
+    if not joined and not only:
+        yield found
+    elif not joined and is_on_a_way(text, found.start, found.end):
+        yield replace(found, own=found.start)
 
 
 def _counted(text: str, found: _Words) -> _Words:
@@ -413,14 +454,15 @@ def _words_of(text: str, name: str, kind: str, match: re.Match[str]) -> Iterator
     elif kind == "read":
         yield _Words(*match.span(), stated, match[0])
     elif kind == "by":
-        start, end = match.span(_DOES)
+        start, end = match.span(DOES)
         both = _WITH_BOTH.match(text, end) if stated.bearing.work else None
         end = end if both is None else both.end()
-        yield _Words(start, end, replace(stated, side=_side(match[_DOES]), words=match[_DOES]))
+        yield _Words(start, end, replace(stated, side=_side(match[DOES]), words=match[DOES]))
     elif kind == "beside":
-        if _is_beside(f"{text[: match.start()]} {text[match.end() :]}", match[0]):
+        beside = _is_beside(f"{text[: match.start()]} {text[match.end() :]}", match[0])
+        if beside or spans_at_once(text, *match.span()):
             yield _Words(*match.span(), stated)
-    elif kind == "how" or _is_subject(text[: match.start()]):
+    elif kind in ("how", "meanwhile") or _is_subject(text[: match.start()]):
         by_hand = stated.bearing.gesture or stated.bearing.work or len(stated.bearing.arms) == 1
         hand = _WITH_HAND.match(text, match.end()) if not stated.side and by_hand else None
         over = _OVER_AND_OVER.match(text, match.end()) if stated.bearing.work else None
@@ -451,14 +493,14 @@ def _gait(text: str, match: re.Match[str], stated: StatedBearing, load: str) -> 
     "walks carrying a box", "stands carrying a box".
     """
     before, verb = text[: match.start()], match["verb"]
-    if verb.endswith("ing") and not load and _person_ahead().match(text, match.end()):
+    if verb.endswith("ing") and not load and person_ahead().match(text, match.end()):
         yield _Words(*match.span(), replace(stated, whole=True))
     elif _is_borne_otherwise(before, verb, text[match.end() :]):
         goes = load if _WAY.search(text) else ""
         joint = _WHILE.search(before) if goes else None
         yield _Words(match.start() if joint is None else joint.start(), match.end(), stated, goes.strip())
     elif not _is_noun(before, verb):
-        yield _Words(*match.span(), stated, _walking()[verb] + load)
+        yield _Words(*match.span(), stated, walking_forms()[verb] + load)
 
 
 def _is_borne_otherwise(before: str, verb: str, after: str) -> bool:
@@ -495,96 +537,3 @@ def _side(words: str) -> Side:
     if side is None:
         return ""
     return "left" if (side[1] == "left") != bool(_HEALTHY.search(words)) else "right"
-
-
-@lru_cache(maxsize=1)
-def _patterns() -> Sequence[tuple[str, str, re.Pattern[str]]]:
-    """Return the id of each bearing, and the kind and the pattern of its words."""
-    return [
-        (name, kind, re.compile(rf"(?<![\w'-])(?:{pattern})(?![\w'])"))
-        for name, words in bearing_words()
-        for kind, entries in words.items()
-        for kind, pattern in _patterns_of(kind, entries)
-    ]
-
-
-@lru_cache(maxsize=1)
-def _unless() -> Mapping[str, re.Pattern[str]]:
-    """Return the pattern of the words beside which a prompt does not ask for a bearing, by its id."""
-    return {
-        name: re.compile(rf"\b(?:{'|'.join(values[UNLESS])})\b")
-        for name, values in bearing_table().items()
-        if UNLESS in values
-    }
-
-
-def _patterns_of(kind: str, entries: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """Yield kind and pattern; adjectives of a movement are of the kind `how`: "sad walk", "walks home tired"."""
-    either = "|".join(entries)
-    if kind in ("how", "beside", "read"):
-        yield kind, "|".join(map(_expanded, entries))
-    elif kind == "by":
-        for who, does in (entry.split(" : ", 1) for entry in entries):
-            yield kind, rf"(?:{who})\b[^.;]*?(?<![\w'-])(?P<{_DOES}>{_expanded(does)})"
-    elif kind in ("gaits", "loads"):
-        for verbs, tail in map(_verbs_and_tail, entries):
-            forms = frozenset(form for verb in verbs for form in verb_forms(verb))
-            yield kind, rf"(?P<verb>{_longest_first(forms)}){_expanded(tail)}"
-    elif kind == "adjectives":
-        yield kind, rf"{_VERY}(?:{either})(?:,| and|, and)?(?= (?:[\w-]+ ){{0,2}}(?:{_people()})\b)"
-        yield kind, rf"{_BE}{_VERY}(?:{either})(?: and)?"
-        yield "how", rf"(?:{either})(?= (?:{_GAITS})\b)"
-        yield "how", rf"(?<!\ba )(?<!\ban )(?<!\bthe )(?:{either})(?=$|[.,;!])"
-    else:
-        yield kind, rf"(?:{either})s?"
-
-
-def _verbs_and_tail(entry: str) -> tuple[Sequence[str], str]:
-    found = _GAIT.match(entry)
-    assert found is not None, entry
-    return found[1].split("|"), found[2]
-
-
-def _expanded(pattern: str) -> str:
-    """Return a pattern with the forms of its verbs and its macros."""
-    for name, words in bearing_macros().items():
-        pattern = pattern.replace(name, words)
-    return re.sub(r"<(\w+)>", lambda verb: f"(?:{_longest_first(verb_forms(verb[1]))})", pattern)
-
-
-def _longest_first(words: frozenset[str]) -> str:
-    return "|".join(sorted(words, key=len, reverse=True))
-
-
-@lru_cache(maxsize=1)
-def _people() -> str:
-    lists = load_word_lists()
-    return _longest_first(lists.people - lists.body_parts - _PRONOUNS)
-
-
-@lru_cache(maxsize=1)
-def _doers() -> re.Pattern[str]:
-    """Return the pattern of the people of whom words ask for a bearing that they do not ask for of others."""
-    people = (entry.split(" : ", 1)[0] for _, words in bearing_words() for entry in words.get("by", ()))
-    return re.compile(rf"\W*(?:(?:{_ALL}) )?(?:{'|'.join(people)})\W*$")
-
-
-@lru_cache(maxsize=1)
-def _person_ahead() -> re.Pattern[str]:
-    return re.compile(rf" (?:[\w-]+ )?(?:{_people()})\b")
-
-
-@lru_cache(maxsize=1)
-def _walking() -> Mapping[str, str]:
-    """Return the form of "walk" for each form of a verb that is read so."""
-    found: dict[str, str] = {}
-    for _, words in bearing_words():
-        for verb in (
-            verb
-            for verbs, _ in map(_verbs_and_tail, [*words.get("gaits", ()), *words.get("loads", ())])
-            for verb in verbs
-        ):
-            forms = {third_person(verb): third_person(_WALK), verb: _WALK}
-            for form in verb_forms(verb):
-                found[form] = forms.get(form) or (gerund(_WALK) if form.endswith("ing") else f"{_WALK}ed")
-    return found

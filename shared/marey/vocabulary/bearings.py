@@ -72,7 +72,7 @@ LEAST_STROKES_HZ = 1.1
 RETURNS_S, ALIKE = 0.45, 0.06
 """Seconds in which a body returns to the first key for the next round, and metres or degrees up to which the last key
 is like the first one."""
-WORDS = ("how", "by", "beside", "gaits", "loads", "read", "adjectives", "beings", "people")
+WORDS = ("how", "by", "beside", "meanwhile", "gaits", "loads", "read", "adjectives", "beings", "people")
 """Fields of a table of `bearings.toml` that hold words."""
 UNLESS = "unless"
 """Field that holds words of prompts that ask for no such bearing."""

@@ -69,3 +69,32 @@ def test_signs_between_clauses_are_no_movements(prompt: str, said: str) -> None:
 )
 def test_how_and_how_far_belong_to_the_clause_before(prompt: str, said: str) -> None:
     assert without_asides(prompt) == said
+
+
+@pytest.mark.parametrize(
+    ("prompt", "said"),
+    [
+        ("SHOT B: he walks in", "he walks in"),
+        ("Scene 4, shot 2: she sits down, then stands up", "she sits down, then stands up"),
+        ("Take 3 - he walks forward", "he walks forward"),
+        ("He takes a shot", "He takes a shot"),
+        ("walk > stop > sit", "walk, then stop, then sit"),
+        ("Step up, clap: a simple party dance", "Step up, clap"),
+    ],
+)
+def test_labels_of_shots_and_names_behind_a_list_are_left_out(prompt: str, said: str) -> None:
+    assert without_asides(prompt) == said
+
+
+@pytest.mark.parametrize(
+    ("prompt", "said"),
+    [
+        ("She walks in and sits down slowly so that nobody hears her", "She walks in and sits down slowly"),
+        ("He waves so as not to be overlooked, then runs", "He waves, then runs"),
+        ("He crouches so he cannot be seen.", "He crouches."),
+        ("He bends so that he can jump", "He bends so that he can jump"),
+        ("He jumps so high that he flies", "He jumps so high that he flies"),
+    ],
+)
+def test_what_a_movement_is_done_for_is_left_out(prompt: str, said: str) -> None:
+    assert without_asides(prompt) == said

@@ -15,7 +15,7 @@ from marey.core.errors import InvalidFile
 from marey.generation.asked import action_of
 from marey.referee.prompts import development_prompts
 from marey.text.action_reader import OUTSIDE, action_reader
-from marey.text.clause_order import CONTEXT, ReadClause, in_order, without_joints
+from marey.text.clause_order import CONTEXT, ReadClause, comes_with, in_order, without_joints
 from marey.text.keys import feature_key
 from marey.text.minilm_encoder import MiniLMEncoder
 from marey.text.pipeline import TextPipeline
@@ -105,6 +105,14 @@ def test_a_movement_keeps_its_words_but_those_that_join_it() -> None:
     assert without_joints(", and then he bows,") == "he bows"
     assert without_joints("and after a short pause, she bows") == "she bows"
     assert without_joints("then") == "then"
+    assert without_joints("and as he runs, he waves") == "as he runs, he waves"
+
+
+def test_what_trails_behind_a_movement_comes_with_it() -> None:
+    assert comes_with("lugs a heavy crate", "staggering under the load")
+    assert comes_with("pushes on", "step by step")
+    assert not comes_with("lugs a heavy crate", "walking off")
+    assert not comes_with("lugs a heavy crate", "stops by the door")
 
 
 def test_three_of_four_development_prompts_are_read_right() -> None:

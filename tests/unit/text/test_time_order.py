@@ -74,13 +74,16 @@ def test_who_goes_on_does_so_again(prompt: str, read: str) -> None:
         ("walks through the snow, freezes", "walks through the snow, freezes"),
         ("turn left, turn right, turn left", "turn left, then turn right, then turn left"),
         ("turn left, walk right", "turn left, walk right"),
+        ("Jab, cross, roundhouse kick", "Jab, cross, then roundhouse kick"),
+        ("slash right, slash left, stab", "slash right, then slash left, stab"),
         ("walks two steps, turns left and keeps walking", "walks two steps, then turns left, then walks forward"),
         ("walks ahead, turns left and keeps walking", "walks ahead, turns left and keeps walking"),
-        ("wave with the right hand while jogging past", "jog past while waving with the right hand"),
-        ("waves while standing", "waves while standing"),
+        ("marches ahead and ends by saluting", "marches ahead, then salutes"),
+        ("he runs, jumps, and finally finishes up by waving at us.", "he runs, jumps, then waves at us."),
+        ("finishes by the door", "finishes by the door"),
     ],
 )
-def test_lists_and_what_is_done_beside_a_way(prompt: str, read: str) -> None:
+def test_lists_and_what_is_done_last(prompt: str, read: str) -> None:
     assert in_time_order(prompt) == read
 
 

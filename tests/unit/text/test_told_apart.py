@@ -25,6 +25,7 @@ def reading() -> TextPipeline:
         ("duck -> roll", ["duck", "roll"]),
         ("bows, arms wide", ["bows, arms wide"]),
         ("jumps, lands softly", ["jumps, lands softly"]),
+        ("as he runs, he waves, then he bows", ["as he runs, he waves", "he bows"]),
         ("a routine (kick, punch, block), then a bow", ["a routine (kick, punch, block)", "a bow"]),
     ],
 )
@@ -37,6 +38,8 @@ def test_signs_set_clauses_apart(text: str, parts: list[str]) -> None:
     [
         ("The goalie throws the ball, ducks, and then raises both fists in triumph", 3),
         ("Turn left, then turn right.", 2),
+        ("While running, he waves to the crowd, then sits down.", 2),
+        ("As she walks forward, she claps her hands", 0),
         ("sidestep right, sidestep left", 2),
         ("hop once on the right leg, then twice on the left leg, then stop", 3),
         ("a backhand swing, then a quick side step to the right, then a forehand swing", 3),

@@ -45,6 +45,44 @@ def test_moods_show_in_the_trunk_of_who_moves_the_arms(prompt: str, action: str,
 
 
 @pytest.mark.parametrize(
+    ("prompt", "left", "names"),
+    [
+        ("As she runs, she waves to the crowd", "she runs", ["waving"]),
+        ("While he claps he walks in a circle", "he walks in a circle", ["clapping"]),
+        ("A woman drinks from a cup while she is walking.", "A woman walking.", ["drinking"]),
+        ("The man nods while walking backwards", "The man walking backwards", ["nodding"]),
+        ("He runs as he waves", "He runs", ["waving"]),
+        ("The woman is clapping while she walks", "The woman walks", ["clapping"]),
+        ("As he backs away, he raises his hands in surrender.", "he backs away.", ["hands-up"]),
+        ("While the tired man talks to his friend, he walks", "he walks", ["gesturing", "tired"]),
+        ("He talks to his friend while walking", "walking", ["gesturing"]),
+        ("As the soldier walks ahead, he aims his rifle", "the soldier walks ahead", ["rifle-aimed"]),
+        ("As he marches past, the guard salutes", "he marches past", ["salute"]),
+        ("She walks along, nodding and clapping", "She walks along", ["nodding", "clapping"]),
+        ("He keeps his guard up as he sidesteps to the left", "sidesteps to the left", ["guard-up"]),
+        ("He walks in, then drinks while turning", "He walks in, then turning", ["drinking"]),
+        ("He walks in and claps", "He walks in and claps", []),
+        ("She sits on a chair, chatting", "She sits on a chair, chatting", []),
+        ("As he jumps, he waves", "As he jumps, he waves", []),
+        ("She drinks as if she walks on air", "She drinks as if she walks on air", []),
+    ],
+)
+def test_what_is_done_at_the_same_time_as_a_way_is_left_out_with_its_clause(
+    prompt: str, left: str, names: list[str]
+) -> None:
+    bare = BarePrompt.of(prompt)
+    assert bare.text == left
+    assert [each.name for each in bare.stated] == names
+    assert parts_by_gestures(prompt) == ()
+
+
+def test_a_clause_keeps_the_word_that_joins_it_to_a_bearing_of_the_same_time() -> None:
+    bare = BarePrompt.of("he stops, and as he turns, he nods")
+    assert bare.text == "he stops, and he turns"
+    assert bare.written(bare.text.index("he turns"), len(bare.text)) == "as he turns, he nods"
+
+
+@pytest.mark.parametrize(
     ("prompt", "left"),
     [
         ("he is jogging and looks exhausted", "he is jogging"),
@@ -437,7 +475,11 @@ def test_gestures_come_before_or_after_what_else_is_done(prompt: str, parts: tup
     assert parts_by_gestures(prompt) == parts
 
 
-@given(st.lists(st.sampled_from(["an old man", "a robot", "walks", "limps", ",", "and", "salutes", "sadly", "waves"])))
+@given(
+    st.lists(
+        st.sampled_from(["an old man", "a robot", "walks", "limps", ",", "and", "salutes", "sadly", "as he", "waves"])
+    )
+)
 def test_characters_that_are_left_know_their_place(words: list[str]) -> None:
     prompt = " ".join(words)
     bare = BarePrompt.of(prompt)
@@ -453,7 +495,7 @@ def test_every_bearing_has_words_and_a_pose_within_what_a_body_can() -> None:
         assert bool(words) != (name in DRAWN.values()), name
         assert re.fullmatch(r"[a-z-]+", name)
     for bearing in load_bearings().values():
-        posed = bearing.arms or bearing.trunk or bearing.gait or bearing.shrug
+        posed = bearing.arms or bearing.trunk or bearing.gait or bearing.shrug or bearing.keys
         assert bool(posed) != bearing.moves, bearing.id
         assert set(bearing.arms) <= {"left", "right"}
         assert abs(bearing.trunk) <= 45

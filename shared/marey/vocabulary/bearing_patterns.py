@@ -1,0 +1,118 @@
+"""Patterns of the words of bearings, expanded from `bearings.toml`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
+
+from marey.vocabulary.bearings import UNLESS, bearing_macros, bearing_table, bearing_words
+from marey.vocabulary.inflection import gerund, third_person, verb_forms
+from marey.vocabulary.word_lists import load_word_lists
+
+_WALK = "walk"
+ALL = r"a|an|the|my|his|her|this|that|one|some"
+"""Determiners of who acts."""
+_VERY = r"(?:(?:very|really|so|rather|quite|extremely|slightly|somewhat|too|visibly|clearly|obviously) )*"
+SEEMS = r"(?:look|feel|seem|appear)(?:s|ed|ing)?"
+"""Verbs of how a body looks."""
+_BE = rf"(?:(?:who|that|which) )?(?:is|are|was|were|being|{SEEMS}(?: to be)?) "
+_PRONOUNS = frozenset(["he", "she", "they", "it", "i", "you", "we", "someone", "somebody"])
+_GAITS = "walk|run|jog|stroll|march|idle|stance|pose|gait|strut|stride|shuffle|standing|walking|running"
+"""Nouns of ways before which an adjective is one of the person: "sad walk"."""
+DOES = "does"
+"""Group of the words that ask for a bearing, behind the people of whom they do so."""
+_GAIT = re.compile(r"([\w|-]+)(.*)", re.DOTALL)
+
+
+@lru_cache(maxsize=1)
+def bearing_patterns() -> Sequence[tuple[str, str, re.Pattern[str]]]:
+    """Return the id of each bearing, and the kind and the pattern of its words."""
+    return [
+        (name, kind, re.compile(rf"(?<![\w'-])(?:{pattern})(?![\w'])"))
+        for name, words in bearing_words()
+        for kind, entries in words.items()
+        for kind, pattern in _patterns_of(kind, entries)
+    ]
+
+
+@lru_cache(maxsize=1)
+def unless_beside() -> Mapping[str, re.Pattern[str]]:
+    """Return the pattern of the words beside which a prompt does not ask for a bearing, by its id."""
+    return {
+        name: re.compile(rf"\b(?:{'|'.join(values[UNLESS])})\b")
+        for name, values in bearing_table().items()
+        if UNLESS in values
+    }
+
+
+def _patterns_of(kind: str, entries: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """Yield kind and pattern; adjectives of a movement are of the kind `how`: "sad walk", "walks home tired"."""
+    either = "|".join(entries)
+    if kind in ("how", "beside", "meanwhile", "read"):
+        yield kind, "|".join(map(_expanded, entries))
+    elif kind == "by":
+        for who, does in (entry.split(" : ", 1) for entry in entries):
+            yield kind, rf"(?:{who})\b[^.;]*?(?<![\w'-])(?P<{DOES}>{_expanded(does)})"
+    elif kind in ("gaits", "loads"):
+        for verbs, tail in map(_verbs_and_tail, entries):
+            forms = frozenset(form for verb in verbs for form in verb_forms(verb))
+            yield kind, rf"(?P<verb>{_longest_first(forms)}){_expanded(tail)}"
+    elif kind == "adjectives":
+        yield kind, rf"{_VERY}(?:{either})(?:,| and|, and)?(?= (?:[\w-]+ ){{0,2}}(?:{_people()})\b)"
+        yield kind, rf"{_BE}{_VERY}(?:{either})(?: and)?"
+        yield "how", rf"(?:{either})(?= (?:{_GAITS})\b)"
+        yield "how", rf"(?<!\ba )(?<!\ban )(?<!\bthe )(?:{either})(?=$|[.,;!])"
+    else:
+        yield kind, rf"(?:{either})s?"
+
+
+def _verbs_and_tail(entry: str) -> tuple[Sequence[str], str]:
+    found = _GAIT.match(entry)
+    assert found is not None, entry
+    return found[1].split("|"), found[2]
+
+
+def _expanded(pattern: str) -> str:
+    """Return a pattern with the forms of its verbs and its macros."""
+    for name, words in bearing_macros().items():
+        pattern = pattern.replace(name, words)
+    return re.sub(r"<(\w+)>", lambda verb: f"(?:{_longest_first(verb_forms(verb[1]))})", pattern)
+
+
+def _longest_first(words: frozenset[str]) -> str:
+    return "|".join(sorted(words, key=len, reverse=True))
+
+
+@lru_cache(maxsize=1)
+def _people() -> str:
+    lists = load_word_lists()
+    return _longest_first(lists.people - lists.body_parts - _PRONOUNS)
+
+
+@lru_cache(maxsize=1)
+def doers() -> re.Pattern[str]:
+    """Return the pattern of the people of whom words ask for a bearing that they do not ask for of others."""
+    people = (entry.split(" : ", 1)[0] for _, words in bearing_words() for entry in words.get("by", ()))
+    return re.compile(rf"\W*(?:(?:{ALL}) )?(?:{'|'.join(people)})\W*$")
+
+
+@lru_cache(maxsize=1)
+def person_ahead() -> re.Pattern[str]:
+    return re.compile(rf" (?:[\w-]+ )?(?:{_people()})\b")
+
+
+@lru_cache(maxsize=1)
+def walking_forms() -> Mapping[str, str]:
+    """Return the form of "walk" for each form of a verb that is read so."""
+    found: dict[str, str] = {}
+    for _, words in bearing_words():
+        for verb in (
+            verb
+            for verbs, _ in map(_verbs_and_tail, [*words.get("gaits", ()), *words.get("loads", ())])
+            for verb in verbs
+        ):
+            forms = {third_person(verb): third_person(_WALK), verb: _WALK}
+            for form in verb_forms(verb):
+                found[form] = forms.get(form) or (gerund(_WALK) if form.endswith("ing") else f"{_WALK}ed")
+    return found
