@@ -152,7 +152,7 @@ def test_who_is_hit_bends_on(said: str, seed: int) -> None:
 def test_what_is_left_out_leaves_the_actions_to_be_seen() -> None:
     hidden = 0
     for seed in range(6):
-        rows = {action: drawn(action, said, seed) for action, said in (("aim", "aims a rifle"), ("shoot", "fires"))}
+        rows = {action: drawn(action, said, seed) for action, said in (("aim", "aims a pistol"), ("shoot", "fires"))}
         aims, fires = rows["aim"], rows["shoot"]
         joined, kept = flowing(aims, fires, LAYOUT), flowing_as_shown(aims, fires, LAYOUT, ("aim", "shoot"))
         assert joined is not None

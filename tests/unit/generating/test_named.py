@@ -76,7 +76,7 @@ def test_they_are_smooth_and_on_the_floor(prompt: str, seed: int) -> None:
     assert joints[..., 1].min() > -0.03
     assert joints[:, TOES, 1].min() < 0.03
     assert np.linalg.norm(np.diff(joints, n=2, axis=0), axis=-1).max() * FPS**2 < 160
-    assert joints[0, PELVIS, 1] > 0.85
+    assert joints[0, PELVIS, 1] > 0.84
 
 
 @pytest.mark.parametrize(("prompt", "times"), [("does three burpees", 3), ("a burpee", 1), ("burpees twice", 2)])

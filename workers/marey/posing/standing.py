@@ -168,7 +168,8 @@ class StandingBody:
         axis = target / distance
         distance = np.clip(distance, abs(upper - lower) + 0.02, 0.98 * (upper + lower))
         along = (distance**2 + upper**2 - lower**2) / (2 * distance)
-        across = np.maximum(-axis[:, :1], 0.0) ** 2
+        before = np.clip(0.5 + 2.0 * axis[:, 2:], 0.0, 1.0)  # hands behind the head leave the elbow where it is
+        across = before * np.maximum(-axis[:, :1], 0.0) ** 2
         poles = np.asarray(pole, np.float64) + _ACROSS * across * [0.0, 0.0, 1.0]
         aside = steady_bends(axis, poles)
         bent = along * axis + np.sqrt(np.maximum(upper**2 - along**2, 0.0)) * aside
