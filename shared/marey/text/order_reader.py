@@ -62,9 +62,9 @@ class OrderReader(Reader):
         vectors = {number: vector / np.linalg.norm(vector) for number, vector in found.items() if vector is not None}
         if len(vectors) < len(asked):
             return asked  # some lie past the encoder's limit
-        return likeliest_order(asked, self._scores(vectors, list(itertools.combinations(asked, 2))))
+        return likeliest_order(asked, self.scores(vectors, list(itertools.combinations(asked, 2))))
 
-    def _scores(self, vectors: Mapping[int, Float32], pairs: Sequence[tuple[int, int]]) -> dict[tuple[int, int], float]:
+    def scores(self, vectors: Mapping[int, Float32], pairs: Sequence[tuple[int, int]]) -> dict[tuple[int, int], float]:
         """Return the log odds that the second of each pair comes before the first, from the vectors (W,) of clauses."""
         weights = self._weights
         inputs = np.stack([np.concatenate([vectors[one], vectors[other]]) for one, other in pairs]) * STATE_SCALE

@@ -1,18 +1,21 @@
-"""Training of the readers of actions and of sequences."""
+"""Training of the readers of actions, of sequences and of the order of time."""
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
 
 import numpy as np
 import pytest
+import torch
 
 from marey.checks.reader_prompts import outside_prompts, sequence_prompts
 from marey.reading import train as training
 from marey.reading import train_encoder as encoder_training
 from marey.reading import train_sequences as sequence_training
-from marey.reading.sequences import parted_texts, written_parts
+from marey.reading.sequences import PartedText, TextPart, parted_texts, written_parts
 from marey.reading.texts import LabelledText, labelled_texts
+from marey.reading.train_order import OrderNetwork, in_time, ordered_texts, weights_of
 from marey.referee.prompts import action_prompts, development_prompts, studio_prompts
 from marey.referee.prompts import sequence_prompts as referee_sequences
 from marey.text.action_reader import OUTSIDE, SEVERAL, ActionReader
@@ -21,6 +24,7 @@ from marey.text.encoders import find_encoder
 from marey.text.minilm import MiniLM
 from marey.text.minilm_bundle import load_weights
 from marey.text.minilm_encoder import MiniLMEncoder
+from marey.text.order_reader import OrderReader, marked
 from marey.text.reader_file import Float32
 from marey.text.sequence_reader import SequenceReader
 from marey.vocabulary.bearing_words import as_written
@@ -112,3 +116,53 @@ def test_a_reader_of_sequences_learns_its_texts(monkeypatch: pytest.MonkeyPatch)
         for found, text in zip(read, several, strict=True)
     ]
     assert np.mean(right) > 0.7
+
+
+ASKS = ("throw", "run", "kneel")
+
+
+@torch.no_grad()
+def test_the_order_of_time_is_scored_as_it_was_trained() -> None:
+    pieces = ["He throws the spear,", " but only after running up to the line,", " and kneels."]
+    parts = [TextPart(piece, asks, place=place) for piece, asks, place in zip(pieces, ASKS, (2, 1, 3), strict=True)]
+    bundle = find_encoder("minilm")
+    (text,) = ordered_texts([PartedText(tuple(parts), 1.0)], MiniLM(bundle))
+    assert text.pairs.tolist() == [[0, 1], [0, 2], [1, 2]]
+    assert text.earlier.tolist() == [1, 0, 0]
+    torch.manual_seed(0)
+    network = OrderNetwork(load_weights(bundle)).eval()
+    for name, parameter in network.layers.named_parameters():
+        if name.endswith("ups"):
+            parameter.normal_(std=0.02)
+    encoder = MiniLMEncoder(bundle)
+    tuned = encoder.tuned({name: part.detach() for name, part in network.layers.updates().items()})
+    written, spans = marked(pieces)
+    encoding = tuned.encode(written)
+    found = [encoding.span(*span) for span in spans]
+    vectors = {
+        number: (each / np.linalg.norm(each)).astype(np.float32)
+        for number, each in enumerate(found)
+        if each is not None
+    }
+    scores = OrderReader([], encoder.sha256, weights_of(network)).scores(vectors, [(0, 1), (0, 2), (1, 2)])
+    assert list(scores.values()) == pytest.approx(network([text]).tolist(), abs=2e-3)
+    bare = encoder.encode(written).tokens
+    assert np.abs(bare - encoding.tokens).max() > 1e-3, "the updates count"
+
+
+def test_places_in_time_of_parts() -> None:
+    def places(*asks: tuple[str, bool, int]) -> list[int]:
+        return PartedText(tuple(TextPart("", name, once, place) for name, once, place in asks), 1.0).places()
+
+    assert places(("walk", False, 0), (CONTEXT, False, 0), ("bow", False, 0)) == [1, 0, 2]
+    assert places(("flip", False, 2), ("run", False, 1), ("cheer", False, 3)) == [2, 1, 3]
+    assert places(("walk", False, 0), ("wave", True, 0), ("bow", False, 0)) == [1, 1, 3]
+
+
+def test_made_texts_say_their_order_in_time() -> None:
+    reordered = [text for text in parted_texts(0) if not in_time(text)]
+    made = [text for text in reordered if text.weight == 1.0]
+    assert len(made) > 1000
+    for text in made:
+        joined = text.text.lower()
+        assert re.search(r"\b(?:before|after|once|prior|following|first|done)\b", joined), joined

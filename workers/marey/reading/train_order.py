@@ -57,7 +57,7 @@ class OrderedText:
         weight: of the text.
     """
 
-    states: Float32
+    states: NDArray[np.float16]
     clauses: NDArray[np.int64]
     pairs: NDArray[np.int64]
     earlier: Float32
