@@ -59,7 +59,7 @@ class OrderReader(Reader):
         text, spans = marked(clauses)
         encoding = encode(text)
         found = {number: encoding.span(*spans[number]) for number in asked}
-        vectors = {number: vector / np.linalg.norm(vector) for number, vector in found.items() if vector is not None}
+        vectors = {number: _unit(vector) for number, vector in found.items() if vector is not None}
         if len(vectors) < len(asked):
             return asked  # some lie past the encoder's limit
         return likeliest_order(asked, self.scores(vectors, list(itertools.combinations(asked, 2))))
@@ -71,6 +71,10 @@ class OrderReader(Reader):
         hidden = np.maximum(inputs @ weights["pair"].T + weights["pair_bias"], 0)
         scores = (hidden @ weights["earlier"].T + weights["earlier_bias"])[:, 0]
         return dict(zip(pairs, map(float, scores), strict=True))
+
+
+def _unit(vector: Float32) -> Float32:
+    return (vector / np.linalg.norm(vector)).astype(np.float32)
 
 
 def marked(clauses: Sequence[str]) -> tuple[str, list[tuple[int, int]]]:
