@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -20,6 +21,8 @@ from marey.text.minilm_encoder import MiniLMEncoder
 from marey.text.reader_file import Float32
 from marey.text.reading_encoder import reading_encoder
 
+CLIPPED = 1.0
+"""Norm to which gradients are clipped in `descent`."""
 Trained = tuple[list[str], dict[str, Float32]]
 """Classes and weights of a reader."""
 
@@ -71,6 +74,29 @@ def fit(
             loss.backward()  # pyright: ignore[reportUnknownMemberType]
             optimizer.step()
     return network.eval()
+
+
+def descent(groups: Sequence[dict[str, Any]], steps: int, warmup: int) -> Callable[[Tensor], None]:
+    """Return a function that takes a step of AdamW down a loss, at rates that rise for `warmup` steps and fall over all
+    `steps`.
+
+    Args:
+        groups: parameters with their rate and decay, as AdamW takes them.
+    """
+    optimizer = torch.optim.AdamW(groups)
+    schedule = torch.optim.lr_scheduler.LambdaLR(
+        optimizer, lambda step: min(1.0, (step + 1) / warmup) * max(0.02, 1 - step / steps)
+    )
+    parameters = [parameter for group in optimizer.param_groups for parameter in group["params"]]
+
+    def descend(loss: Tensor) -> None:
+        optimizer.zero_grad()
+        loss.backward()  # pyright: ignore[reportUnknownMemberType]
+        nn.utils.clip_grad_norm_(parameters, CLIPPED)
+        optimizer.step()
+        schedule.step()
+
+    return descend
 
 
 def side_by_side(networks: Sequence[nn.Sequential]) -> dict[str, Float32]:

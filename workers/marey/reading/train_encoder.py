@@ -23,7 +23,7 @@ from torch import Tensor, nn
 
 from marey.data.captions import seeded
 from marey.motion.files import write_atomically
-from marey.reading.networks import as_arrays
+from marey.reading.networks import as_arrays, descent
 from marey.reading.sequences import PartedText, TextPart, parted_texts
 from marey.reading.train_sequences import LabelledTokens, batches, cut_loss, labelled, shown
 from marey.reading.updates import UpdatedLayers
@@ -37,7 +37,7 @@ from marey.vocabulary.entries import load_vocabulary
 
 UPDATED = 2
 """Layers that get updates, from the last one on."""
-EPOCHS, BATCH, CLIPPED = 7, 96, 1.0
+EPOCHS, BATCH = 7, 96
 RATE, HEAD_RATE, DECAY, HEAD_DECAY, WARMUP = 1e-3, 2e-3, 0.01, 0.02, 200
 INPUT_DROPOUT, HEAD_DROPOUT = 0.15, 0.4
 UNITS, VECTOR_SCALE, SMOOTHING = 256, 10.0, 0.05
@@ -97,20 +97,11 @@ def train(texts: Sequence[PartedText], encoder: MiniLM, weights: Mapping[str, Te
         {"params": layers, "lr": RATE, "weight_decay": DECAY},
         {"params": [part for head in heads for part in head.parameters()], "lr": HEAD_RATE, "weight_decay": HEAD_DECAY},
     ]
-    optimizer = torch.optim.AdamW(groups)
-    total = EPOCHS * -(-len(read) // BATCH)
-    schedule = torch.optim.lr_scheduler.LambdaLR(
-        optimizer, lambda step: min(1.0, (step + 1) / WARMUP) * max(0.02, 1 - step / total)
-    )
+    descend = descent(groups, EPOCHS * -(-len(read) // BATCH), WARMUP)
     rng = seeded("encoder", str(seed))
     for _ in range(EPOCHS):
         for batch in batches(read, rng, BATCH, lambda each: len(each.tokens.states)):
-            loss = _loss(network, batch, shares)
-            optimizer.zero_grad()
-            loss.backward()  # pyright: ignore[reportUnknownMemberType]
-            nn.utils.clip_grad_norm_(network.parameters(), CLIPPED)
-            optimizer.step()
-            schedule.step()
+            descend(_loss(network, batch, shares))
     return network.layers.updates()
 
 

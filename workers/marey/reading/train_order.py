@@ -21,7 +21,7 @@ from torch import Tensor, nn
 
 from marey.data.captions import seeded
 from marey.motion.files import write_atomically
-from marey.reading.networks import as_arrays
+from marey.reading.networks import as_arrays, descent
 from marey.reading.sequences import WRITTEN, PartedText, parted_texts
 from marey.reading.train_sequences import batches, padded
 from marey.reading.updates import UpdatedLayers
@@ -35,7 +35,7 @@ from marey.text.reader_file import Float32
 from marey.text.reading_encoder import reading_encoder
 
 UNITS, DROPOUT = 128, 0.3
-EPOCHS, BATCH, CLIPPED, WARMUP = 6, 64, 1.0, 100
+EPOCHS, BATCH, WARMUP = 6, 64, 100
 RATE, HEAD_RATE, DECAY, HEAD_DECAY = 1e-3, 2e-3, 0.01, 0.02
 EARLIER_WEIGHT = 1.5
 """Weight of a pair that is told in the other order, beside one that is not."""
@@ -107,16 +107,11 @@ def train(texts: Sequence[OrderedText], weights: Mapping[str, Tensor], seed: int
     torch.manual_seed(seed)
     network = OrderNetwork(weights)
     heads = [*network.pair.parameters(), *network.earlier.parameters()]
-    optimizer = torch.optim.AdamW(
-        [
-            {"params": list(network.layers.parameters()), "lr": RATE, "weight_decay": DECAY},
-            {"params": heads, "lr": HEAD_RATE, "weight_decay": HEAD_DECAY},
-        ]
-    )
-    total = EPOCHS * -(-len(texts) // BATCH)
-    schedule = torch.optim.lr_scheduler.LambdaLR(
-        optimizer, lambda step: min(1.0, (step + 1) / WARMUP) * max(0.02, 1 - step / total)
-    )
+    groups = [
+        {"params": list(network.layers.parameters()), "lr": RATE, "weight_decay": DECAY},
+        {"params": heads, "lr": HEAD_RATE, "weight_decay": HEAD_DECAY},
+    ]
+    descend = descent(groups, EPOCHS * -(-len(texts) // BATCH), WARMUP)
     rng = seeded("order", str(seed))
     for _ in range(EPOCHS):
         for batch in batches(texts, rng, BATCH, lambda each: len(each.states)):
@@ -124,12 +119,7 @@ def train(texts: Sequence[OrderedText], weights: Mapping[str, Tensor], seed: int
             shares = torch.tensor([each.weight for each in batch for _ in each.pairs])
             shares = shares * (1 + (EARLIER_WEIGHT - 1) * earlier)
             losses = F.binary_cross_entropy_with_logits(network(batch), earlier, reduction="none")
-            loss = (losses * shares).sum() / shares.sum()
-            optimizer.zero_grad()
-            loss.backward()  # pyright: ignore[reportUnknownMemberType]
-            nn.utils.clip_grad_norm_(network.parameters(), CLIPPED)
-            optimizer.step()
-            schedule.step()
+            descend((losses * shares).sum() / shares.sum())
     return network.eval()
 
 

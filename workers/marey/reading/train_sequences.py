@@ -19,7 +19,7 @@ from torch import Tensor, nn
 
 from marey.checks.reader_prompts import outside_prompts, sequence_prompts
 from marey.data.captions import seeded
-from marey.reading.networks import NetworkRecipe, Trained, as_arrays, fit, side_by_side, train_and_write
+from marey.reading.networks import NetworkRecipe, Trained, as_arrays, descent, fit, side_by_side, train_and_write
 from marey.reading.sequences import PartedText, parted_texts
 from marey.referee.prompts import development_prompts
 from marey.text.action_reader import OUTSIDE
@@ -112,20 +112,13 @@ def fit_cuts(texts: Sequence[LabelledTokens], classes: int, seed: int) -> _Cuts:
     """Train the network of beginnings."""
     torch.manual_seed(seed)
     network = _Cuts(texts[0].states.shape[1], classes)
-    optimizer = torch.optim.AdamW(network.parameters(), lr=RATE, weight_decay=DECAY)
+    groups = [{"params": list(network.parameters()), "lr": RATE, "weight_decay": DECAY}]
+    descend = descent(groups, CUT_EPOCHS * -(-len(texts) // CUT_BATCH), WARMUP)
     rng = seeded("cuts", str(seed))
-    total, step = CUT_EPOCHS * -(-len(texts) // CUT_BATCH), 0
     for _ in range(CUT_EPOCHS):
         for batch in batches(texts, rng, CUT_BATCH, lambda each: len(each.states)):
-            for group in optimizer.param_groups:
-                group["lr"] = RATE * min(1, (step + 1) / WARMUP) * max(0.02, 1 - step / total)
             begins, named = network(*shown(batch))
-            loss = cut_loss(begins, named, batch)
-            optimizer.zero_grad()
-            loss.backward()  # pyright: ignore[reportUnknownMemberType]
-            nn.utils.clip_grad_norm_(network.parameters(), 1.0)
-            optimizer.step()
-            step += 1
+            descend(cut_loss(begins, named, batch))
     return network.eval()
 
 
@@ -230,7 +223,8 @@ def _rates(reader: SequenceReader, encoder: MiniLMEncoder) -> str:
     """Return how many held-out sequences are read right, and how many other prompts are taken for some."""
 
     def read(text: str) -> tuple[ReadMovement, ...]:
-        return reader.read(as_written(text), encoder.encode(text), encoder.pooled, in_time)
+        bare = as_written(text)
+        return reader.read(bare, reader.written_clauses(bare, encoder.encode(text), encoder.pooled), in_time)
 
     by_order = reading_encoder(MiniLMEncoder(find_encoder("minilm")), ORDER_FILE)
     in_time = partial(order_reader().order, encode=by_order.encode)
