@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from functools import lru_cache
 
-from marey.vocabulary.inflection import gerund, third_person, verb_forms
+from marey.vocabulary.inflection import forms_of_other, verb_forms
 
 _WALK = "walk"
 _WAYS: Mapping[str, tuple[tuple[str, ...], str, str]] = {
@@ -79,7 +79,5 @@ def _forms() -> Mapping[str, str]:
     found = dict[str, str]()
     for verbs, _, _ in _WAYS.values():
         for verb in verbs:
-            same = {verb: _WALK, third_person(verb): third_person(_WALK)}
-            for form in verb_forms(verb):
-                found[form] = same.get(form) or (gerund(_WALK) if form.endswith("ing") else f"{_WALK}ed")
+            found |= forms_of_other(verb, _WALK)
     return found

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 
 from marey.vocabulary.bearings import UNLESS, bearing_macros, bearing_table, bearing_words
-from marey.vocabulary.inflection import gerund, third_person, verb_forms
+from marey.vocabulary.inflection import forms_of_other, verb_forms
 from marey.vocabulary.word_lists import load_word_lists
 
 _WALK = "walk"
@@ -112,7 +112,5 @@ def walking_forms() -> Mapping[str, str]:
             for verbs, _ in map(_verbs_and_tail, [*words.get("gaits", ()), *words.get("loads", ())])
             for verb in verbs
         ):
-            forms = {third_person(verb): third_person(_WALK), verb: _WALK}
-            for form in verb_forms(verb):
-                found[form] = forms.get(form) or (gerund(_WALK) if form.endswith("ing") else f"{_WALK}ed")
+            found |= forms_of_other(verb, _WALK)
     return found

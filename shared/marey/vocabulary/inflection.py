@@ -128,6 +128,14 @@ def phrase_in_third_person(phrase: str) -> str:
     return " ".join([third_person(verb), *rest])
 
 
+def forms_of_other(base: str, other: str) -> dict[str, str]:
+    """Return the form of another, regular verb for each form of a verb: of "walk" "walking" for "strolling"."""
+    same = {third_person(base): third_person(other), base: other}
+    return {
+        form: same.get(form) or (gerund(other) if form.endswith("ing") else f"{other}ed") for form in verb_forms(base)
+    }
+
+
 def gerund(base: str) -> str:
     """Return the form with -ing: walking, carrying, stopping."""
     return max(_gerunds(base), key=len)
