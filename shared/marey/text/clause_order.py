@@ -112,6 +112,11 @@ class ReadClause:
     at_once: bool = False
     place: int = 0
 
+    @property
+    def moves(self) -> bool:
+        """It asks for a movement."""
+        return self.name != CONTEXT
+
 
 def without_joints(text: str) -> str:
     """Return a clause without the words that join it to others: "and then he bows," is "he bows"; "as he runs, he
@@ -129,7 +134,7 @@ def in_order(clauses: Sequence[ReadClause]) -> list[list[ReadClause]]:
     """
     groups: list[list[ReadClause]] = []
     for clause in clauses:
-        if clause.name == CONTEXT:
+        if not clause.moves:
             continue
         if groups and clause.at_once:
             groups[-1].append(clause)

@@ -54,7 +54,7 @@ class OrderReader(Reader):
             encode: by the encoder with the updates of the file.
         """
         asked = tuple(number for number, moves in enumerate(moving) if moves)
-        if not 1 < len(asked) <= MOST_CLAUSES:
+        if not is_asked_for_order(moving):
             return asked
         text, spans = marked(clauses)
         encoding = encode(text)
@@ -75,6 +75,11 @@ class OrderReader(Reader):
 
 def _unit(vector: Float32) -> Float32:
     return (vector / np.linalg.norm(vector)).astype(np.float32)
+
+
+def is_asked_for_order(moving: Sequence[bool]) -> bool:
+    """Return True if `OrderReader.order` encodes the clauses, which are as many as can be compared."""
+    return 1 < sum(moving) <= MOST_CLAUSES
 
 
 def marked(clauses: Sequence[str]) -> tuple[str, list[tuple[int, int]]]:

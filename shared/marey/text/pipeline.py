@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -33,7 +32,6 @@ from marey.text.labellers import OneAtATime
 from marey.text.loading import load_encoder, load_labeller, load_rewriter
 from marey.text.misleading_words import without_misleading
 from marey.text.order_reader import FILE as ORDER_FILE
-from marey.text.order_reader import order_reader
 from marey.text.parsed import ParsedPrompt, warnings_of, without_punctuation
 from marey.text.plain_action import only_action, with_subject
 from marey.text.plain_phrases import with_plain_phrases
@@ -225,7 +223,7 @@ class TextPipeline:
         readings = self._readings([each.text for each in rewritten])
         read = self._read(readings)
         graphs = [self._graphs([each.worded for each in reading.movements]) for reading in readings]
-        self._encode_nodes([*(graph for graph, _ in read), *chain(*graphs)])
+        self._encode_together([*(graph for graph, _ in read), *chain(*graphs)], [actions for _, actions in read])
         return [
             replace(
                 self._features(prompt, graph, actions),
@@ -238,10 +236,12 @@ class TextPipeline:
             )
         ]
 
-    def _encode_nodes(self, graphs: Sequence[SemanticGraph]) -> None:
-        """Encode the nodes of several graphs in a few passes, in a quarter of the time; `encode` finds them."""
-        if self.spec.node_features == "pooled" and len(graphs) > 1:
-            self.pooled([node.text for graph in graphs for node in graph.nodes])
+    def _encode_together(self, graphs: Sequence[SemanticGraph], actions: Sequence[Sequence[str]]) -> None:
+        """Encode the nodes of several graphs, and the actions of prompts with several, in a few passes, in a quarter of
+        the time; `_features` finds them."""
+        if len(graphs) > 1:
+            nodes = [node.text for graph in graphs for node in graph.nodes if self.spec.node_features == "pooled"]
+            self.pooled([*nodes, *(text for texts in actions if len(texts) > 1 for text in texts)])
 
     def _movements(
         self, movements: Sequence[ReadMovement], graphs: Sequence[SemanticGraph]
@@ -260,8 +260,8 @@ class TextPipeline:
         encoded, ordered = self._texts_to_read, self._texts_to_order
         if encoded is None or ordered is None:
             return [ReadPrompt.of(text, only_action(text)) for text in texts]
-        in_time = partial(order_reader().order, encode=ordered.encode)
-        return TrainedReaders(encoded.pooled, encoded.encodings, in_time, movements=self.spec.movements).read(texts)
+        readers = TrainedReaders(encoded.pooled, encoded.encodings, ordered.encodings, movements=self.spec.movements)
+        return readers.read(texts)
 
     def _encoded_for_readers(self) -> tuple[EncodedTexts, EncodedTexts] | tuple[None, None]:
         """Return the texts as the readers read them, and as that of the order of time does; None if prompts are read by

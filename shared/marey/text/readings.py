@@ -17,12 +17,13 @@ from marey.text.action_reader import (
     joins_clauses,
     named_actions,
 )
-from marey.text.clause_order import BOUND_TO_HANDS, comes_with, without_joints
+from marey.text.clause_order import BOUND_TO_HANDS, ReadClause, comes_with, without_joints
 from marey.text.clause_parts import SERIES, before_next_verb, only_named, parts_in_time
 from marey.text.elided_words import parts_by_sides
 from marey.text.encoders import Encoding
 from marey.text.held_hand import with_held_hand
 from marey.text.misleading_words import EXERCISE, has_other_sense, lunges_as_exercise, without_misleading
+from marey.text.order_reader import is_asked_for_order, marked, order_reader
 from marey.text.plain_action import with_plain_action
 from marey.text.reader_file import Float32
 from marey.text.sequence_reader import (
@@ -100,7 +101,7 @@ class TrainedReaders:
         self,
         pooled: Callable[[Sequence[str]], Sequence[Float32]],
         encode: Callable[[Sequence[str]], Sequence[Encoding]],
-        in_time: Callable[[Sequence[str], Sequence[bool]], Sequence[int]],
+        encode_marked: Callable[[Sequence[str]], Sequence[Encoding]],
         *,
         movements: bool,
     ) -> None:
@@ -109,12 +110,14 @@ class TrainedReaders:
         Args:
             pooled: returns the sentence vectors (W,) of texts, by the encoder of the readers.
             encode: returns the encodings of texts.
-            in_time: returns the order of clauses in time (`SequenceReader.read`).
+            encode_marked: returns those of texts with marks between their clauses, by the encoder of `OrderReader`.
             movements: a prompt of several movements is read movement by movement.
         """
-        self._pooled, self._encode, self._in_time, self._movements = pooled, encode, in_time, movements
+        self._pooled, self._encode, self._encode_marked, self._movements = pooled, encode, encode_marked, movements
         self._actions: dict[str, ReadAction] = {}
         self._encodings: dict[str, Encoding] = {}
+        self._clauses: dict[BarePrompt, Sequence[ReadClause]] = {}
+        self._marked: dict[str, Encoding] = {}
 
     def read(self, texts: Sequence[str]) -> list[ReadPrompt]:
         """Return what each text asks for."""
@@ -199,9 +202,26 @@ class TrainedReaders:
         """Encode prompts that may ask for several movements, and all that may be one of these."""
         if not self._movements or len(bare) < 2:
             return
-        unsure = list(dict.fromkeys(each.text for each in bare if not self._is_surely_one(each, self._read_bare(each))))
-        self._encodings.update(zip(unsure, self._encode(unsure), strict=True))
+        unsure = {each.text: each for each in bare if not self._is_surely_one(each, self._read_bare(each))}
+        self._encodings.update(zip(unsure, self._encode(list(unsure)), strict=True))
         self._pooled([clause for text in unsure for clause in sequence_reader().clauses(text, self._encodings[text])])
+        cut = map(self._clauses_of, unsure.values())
+        asked = [clauses for clauses in cut if is_asked_for_order([clause.moves for clause in clauses])]
+        texts = [marked([clause.text for clause in clauses])[0] for clauses in asked]
+        self._marked.update(zip(texts, self._encode_marked(texts), strict=True))
+
+    def _clauses_of(self, bare: BarePrompt) -> Sequence[ReadClause]:
+        if bare not in self._clauses:
+            encoding = self._encodings.get(bare.text) or self._encode([bare.text])[0]
+            self._clauses[bare] = sequence_reader().written_clauses(bare, encoding, self._pooled)
+        return self._clauses[bare]
+
+    def _in_time(self, clauses: Sequence[str], moving: Sequence[bool]) -> Sequence[int]:
+        """Return the numbers of clauses that ask for a movement, in the order of time."""
+        return order_reader().order(clauses, moving, self._marked_encoding)
+
+    def _marked_encoding(self, text: str) -> Encoding:
+        return self._marked.get(text) or self._encode_marked([text])[0]
 
     def _reading(self, bare: BarePrompt) -> ReadPrompt:
         if only_gaze(bare.prompt) or _stops_and_looks(bare.prompt):
@@ -338,8 +358,7 @@ class TrainedReaders:
     def _movements_in(self, bare: BarePrompt, action: str | None) -> tuple[ReadMovement, ...]:
         if action is None and (way := way_to_a_stop(bare.prompt)) and (ends := self._read_action(way).action) in WAYS:
             action = ends  # "sprints forward then stops suddenly"
-        encoding = self._encodings.get(bare.text) or self._encode([bare.text])[0]
-        movements = sequence_reader().read(bare, encoding, self._pooled, self._in_time, action)
+        movements = sequence_reader().read(bare, self._clauses_of(bare), self._in_time, action)
         if not lunges_as_exercise(bare.prompt):
             return movements
         return tuple(

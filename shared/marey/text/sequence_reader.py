@@ -174,8 +174,7 @@ class SequenceReader(Reader):
     def read(
         self,
         bare: BarePrompt,
-        encoding: Encoding,
-        pooled: Callable[[Sequence[str]], Sequence[Float32]],
+        written: Sequence[ReadClause],
         in_time: Callable[[Sequence[str], Sequence[bool]], Sequence[int]],
         action: str | None = None,
     ) -> tuple[ReadMovement, ...]:
@@ -188,8 +187,7 @@ class SequenceReader(Reader):
 
         Args:
             bare: the prompt, and the text of it that is read.
-            encoding: of that text.
-            pooled: returns the sentence vectors (W,) of texts.
+            written: its clauses (`written_clauses`).
             in_time: returns the numbers of the clauses that ask for a movement, in the order of time, from all clauses
                 as they are written, and whether each asks for one (`OrderReader.order`).
             action: that the reader of actions takes the prompt for; None = several, none, or in doubt.
@@ -197,8 +195,7 @@ class SequenceReader(Reader):
         if way := way_to_rest(bare.prompt, action):
             several = [ReadMovement(text, one) for text, one in parts_in_time(way)]  # "jogs, slows to a walk and stops"
             return (*(several or [ReadMovement(way, action)]), rest())
-        written = _placed(self._clauses(bare, encoding, pooled), in_time)
-        whole = list(parted(with_belongings(written)))
+        whole = list(parted(with_belongings(_placed(written, in_time))))
         if len(whole) == 1 < len(written) and (whole[0].name in BOUND_TO_HANDS or _is_doubtless(whole[0])):
             return (ReadMovement(bare.prompt, whole[0].name),)
         groups = in_order(whole)
@@ -214,10 +211,16 @@ class SequenceReader(Reader):
             found[-1] = rest()
         return tuple(found)
 
-    def _clauses(
+    def written_clauses(
         self, bare: BarePrompt, encoding: Encoding, pooled: Callable[[Sequence[str]], Sequence[Float32]]
     ) -> list[ReadClause]:
-        """Return the likeliest clauses of a prompt, as they are written."""
+        """Return the likeliest clauses of a prompt, as they are written.
+
+        Args:
+            bare: the prompt, and the text of it that is read.
+            encoding: of that text.
+            pooled: returns the sentence vectors (W,) of texts.
+        """
         cuts = self._cuts(bare.text, encoding)
         edges = cuts.edges
         rows = [
@@ -271,7 +274,7 @@ def _placed(
     clauses: Sequence[ReadClause], in_time: Callable[[Sequence[str], Sequence[bool]], Sequence[int]]
 ) -> list[ReadClause]:
     """Return clauses with their places in time."""
-    order = in_time([clause.text for clause in clauses], [clause.name != CONTEXT for clause in clauses])
+    order = in_time([clause.text for clause in clauses], [clause.moves for clause in clauses])
     place_of = {number: place for place, number in enumerate(order)}
     return [replace(clause, place=place_of.get(number, 0)) for number, clause in enumerate(clauses)]
 

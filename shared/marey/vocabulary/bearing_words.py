@@ -21,7 +21,7 @@ from marey.vocabulary.bearings import Side, StatedBearing, each_once
 from marey.vocabulary.counts import stated_strokes, strokes_before, strokes_behind
 from marey.vocabulary.held_poses import held_words
 from marey.vocabulary.inflection import verb_forms
-from marey.vocabulary.meanwhile import JOINS_AHEAD, WAYS, is_on_a_way, spans_at_once
+from marey.vocabulary.meanwhile import AT_ONCE, JOINS_AHEAD, WAYS, is_on_a_way, spans_at_once
 from marey.vocabulary.word_lists import load_word_lists
 
 KEPT_READINGS = 1024
@@ -268,7 +268,7 @@ def stated_bearings(prompt: str) -> tuple[StatedBearing, ...]:
 def is_done_at_once(text: str) -> bool:
     """Return True if a text says in two clauses what a body does, and which bearing it has in it: "as he runs, he
     waves"."""
-    return any(each.at_once for each in _found(text))
+    return AT_ONCE.search(text) is not None and any(each.at_once for each in _found(text))
 
 
 def parts_by_gestures(prompt: str) -> tuple[str, ...]:

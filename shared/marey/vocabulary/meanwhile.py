@@ -26,6 +26,8 @@ _GOES = (
 _BASE = rf"(?:{_GOES}|(?:kneel(?:s|ing)?|sit(?:s|ting)?)\b)"
 """Verbs of the clause that is read: those of ways, and of postures in which the arms are free."""
 _AS = r"(?:as|while|whilst)(?! (?:if|though|soon|well|long|far|usual|much|many|a|an)\b)"
+AT_ONCE = re.compile(r"\b(?:as|while|whilst)\b", re.IGNORECASE)
+"""Words without one of which no text says that two things are done at once."""
 JOINS_AHEAD = re.compile(r"\b(?:as|while|whilst) $", re.IGNORECASE)
 """A word ahead of a clause that joins it to the next one."""
 _HOW = r"(?:(?:is|are|also|still|\w+ly) )*"

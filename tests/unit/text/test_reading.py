@@ -108,8 +108,12 @@ def test_a_reader_of_sequences_learns_its_texts(monkeypatch: pytest.MonkeyPatch)
     classes, weights = sequence_training.train([*some, *several * 5], encoder, 0)
     reader = SequenceReader(classes, encoder.sha256, {name: part.astype(np.float16) for name, part in weights.items()})
     read = [
-        reader.read(as_written(text.text), encoding, encoder.pooled, order_of_time)
-        for text, encoding in zip(several, encoder.encodings([text.text for text in several]), strict=True)
+        reader.read(bare, reader.written_clauses(bare, encoding, encoder.pooled), order_of_time)
+        for bare, encoding in zip(
+            [as_written(text.text) for text in several],
+            encoder.encodings([text.text for text in several]),
+            strict=True,
+        )
     ]
     right = [
         {each.action for each in found} == {part.asks for part in text.parts}

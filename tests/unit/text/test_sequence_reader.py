@@ -44,7 +44,9 @@ def reading() -> TextPipeline:
 
 def read(prompt: str) -> tuple[ReadMovement, ...]:
     encoder = shared_reading_encoder()
-    return sequence_reader().read(as_written(prompt), encoder.encode(prompt), encoder.pooled, order_of_time)
+    reader, bare = sequence_reader(), as_written(prompt)
+    written = reader.written_clauses(bare, encoder.encode(prompt), encoder.pooled)
+    return reader.read(bare, written, order_of_time)
 
 
 def test_it_knows_every_action_and_the_shipped_encoder() -> None:
