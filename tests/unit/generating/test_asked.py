@@ -12,12 +12,13 @@ import numpy as np
 import pytest
 
 from marey.generation import asked
-from marey.generation.asked import AskedMotion, _Wish, changes_of, generate_as_asked, is_winding
+from marey.generation.asked import AskedMotion, changes_of, generate_as_asked
 from marey.generation.paced import SPEEDS, WAY_SPEEDS
 from marey.generation.port import KeptFrames, Limits, Request
 from marey.generation.shots.windows import no_text
 from marey.generation.stepped import frames_of_steps
 from marey.generation.timed import CUT
+from marey.generation.wish import Wish, is_winding
 from marey.motion.courses import natural_course
 from marey.motion.features import HUMANML3D_263
 from marey.motion.skeleton import HUMANML3D
@@ -272,7 +273,7 @@ def test_ways_are_straight_unless_their_prompt_says_otherwise() -> None:
 
 
 def test_a_circle_has_the_time_to_close() -> None:
-    wish = _Wish.of(ask("a man walks in a wide circle"))
+    wish = Wish.of(ask("a man walks in a wide circle"))
     limits = Limits(16, 196, 20.0, 8, keeps=4)
     short = replace(ask("a man walks in a wide circle"), frames=60, open=True)
     assert (wish.for_network(short, limits).frames or 0) > 150

@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 
 from marey.core.errors import InvalidInput
-from marey.generation.asked import AskedMotion, _Wish, changes_of, generate_as_asked
+from marey.generation.asked import AskedMotion, changes_of, generate_as_asked
 from marey.generation.drawn_whole import _asked_for, drawn_whole
 from marey.generation.fine_wish import FineWish
 from marey.generation.port import Limits, NoControl, Request
 from marey.generation.shots.windows import no_text
+from marey.generation.wish import Wish
 from marey.motion.features import HUMANML3D_263
 from marey.posing.limbs import FPS
 from marey.quality.record import SHOWN
@@ -176,7 +177,7 @@ def test_who_stands_before_others_does_so_for_a_moment() -> None:
 
 @pytest.mark.parametrize(("prompt", "turns"), [("spins once", 1), ("twirls around twice", 2), ("spins", None)])
 def test_a_number_of_spins_is_as_many_whole_turns(prompt: str, turns: int | None) -> None:
-    turn = _Wish.of(ask(prompt)).turn
+    turn = Wish.of(ask(prompt)).turn
     assert turn is not None
     assert (turn.least == 360.0 * turns) if turns else turn.whole
 

@@ -10,7 +10,6 @@ import pytest
 
 from marey.bundles.manifest import BundleManifest
 from marey.core.errors import InvalidInput
-from marey.generation.asked import action_of
 from marey.generation.candidates import DrawPlan, best_clips
 from marey.generation.constraints.draw import constrained_request
 from marey.generation.export import finish
@@ -22,6 +21,7 @@ from marey.generation.shots.dispatch import generate_any, resolve_request, timel
 from marey.generation.shots.headings import heading_change, with_whole_turns
 from marey.generation.shots.sequences import WAITS_S, as_timeline
 from marey.generation.shots.timelines import TimelineMotion
+from marey.generation.wish import action_of
 from marey.items.timeline import read_timeline, timeline_rows
 from marey.motion.edits.timeline_rows import cut_rows
 from marey.text.features import TextFeatures

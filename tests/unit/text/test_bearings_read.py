@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from marey.generation.asked import action_of
+from marey.generation.wish import action_of
 from marey.text.pipeline import TextPipeline
 from marey.vocabulary.entries import load_vocabulary
 from tests.support.texts import shared_pipeline

@@ -12,7 +12,7 @@ from safetensors.numpy import save_file
 from marey.bundles import TextSpec
 from marey.checks.reader_prompts import outside_prompts, sequence_prompts
 from marey.core.errors import InvalidFile
-from marey.generation.asked import action_of
+from marey.generation.wish import action_of
 from marey.referee.prompts import development_prompts
 from marey.text.action_reader import OUTSIDE, action_reader
 from marey.text.clause_order import CONTEXT, ReadClause, comes_with, in_order, without_joints

@@ -14,56 +14,44 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.drawing.kinds import COUNTED
-from marey.generation.begun import begun, frames_to_begin
-from marey.generation.distances import SPEEDS, as_far, distance_of, farther, frames_of_distance
-from marey.generation.drawn_sides import drawn_side
+from marey.generation.begun import begun
+from marey.generation.distances import SPEEDS, as_far, distance_of, farther
 from marey.generation.drawn_whole import DrawnWhole, drawn_whole
 from marey.generation.ends import ended
 from marey.generation.even_runs import EVEN, even_run
 from marey.generation.fine import FINE, drawn_features
-from marey.generation.fine_wish import FineWish
 from marey.generation.flights import DANCES, JUMPS, ON_FEET, fallen, lowered, on_floor
 from marey.generation.footing import RUNS, footed
 from marey.generation.gazing import GAZE
 from marey.generation.onward import without_return
-from marey.generation.paced import AskedPace
 from marey.generation.passes import PassControl
-from marey.generation.port import GenerationControl, Generator, Limits, MotionFeatures, NoControl, Request, S
+from marey.generation.port import GenerationControl, Generator, MotionFeatures, NoControl, Request, S
 from marey.generation.pose_holds import HOLDING, with_held_pose
 from marey.generation.postured import GOING_ON, drawn_posture, gone_on, on_posture
-from marey.generation.raising import stated_action
 from marey.generation.repetitions import repeated
 from marey.generation.stated import AT_PACE
-from marey.generation.steered import CLOSED, frames_of_circle, steered_features
-from marey.generation.stepped import frames_of_steps, stepped
+from marey.generation.steered import steered_features
+from marey.generation.stepped import stepped
 from marey.generation.timed import CUT, cut_of
 from marey.generation.turned import NEAR, ended_turn, turned_features
-from marey.generation.whole_body import AGAIN
+from marey.generation.wish import SPINNING, Wish
 from marey.items.values import MAX_SECONDS
 from marey.motion.courses import course_of
 from marey.motion.features import FeatureLayout
 from marey.motion.paced_features import pace_features
 from marey.motion.skeleton import HUMANML3D
 from marey.quality.record import SHOWN
-from marey.selector.limbs import NamedLimb, limb_of
-from marey.selector.matching import ON_THE_SPOT, TURNING, WAYS, Step, wanted_of
+from marey.selector.matching import ON_THE_SPOT
 from marey.selector.motion import SHORTEST, Motion
 from marey.selector.records import match_joints
 from marey.selector.repetitions import REPETITIONS, Repetition
 from marey.selector.rules import RULES
-from marey.text.features import TextFeatures
 from marey.vocabulary.bearing_words import stated_bearings
-from marey.vocabulary.counts import STEPPING, stated_count
-from marey.vocabulary.courses import STRAIGHT as STRAIGHT_ON
+from marey.vocabulary.counts import STEPPING
 from marey.vocabulary.courses import WAYS as STEERED
-from marey.vocabulary.courses import WayCourse, dribbles_ahead, stated_course
-from marey.vocabulary.distances import stated_distance
-from marey.vocabulary.entries import load_vocabulary
-from marey.vocabulary.gazes import Glance, stated_gaze, without_gaze
-from marey.vocabulary.held_poses import held_pose, stated_hold
+from marey.vocabulary.courses import dribbles_ahead
+from marey.vocabulary.held_poses import held_pose
 from marey.vocabulary.scope import STANDING
-from marey.vocabulary.turns import WHOLE, Turn, stated_spins, stated_turn
 
 Float32 = NDArray[np.float32]
 
@@ -103,149 +91,11 @@ def changes_of(motion: MotionFeatures) -> Mapping[str, Any]:
     return motion.changes if isinstance(motion, AskedMotion) else {}
 
 
-COUNTABLE = frozenset({*REPETITIONS, *AGAIN, *(COUNTED.keys() - FINE.keys())})
-"""Actions that are done as often as a prompt asks: their number is found in a motion, or they are drawn so often."""
-SPINNING = "spin"
 DRIBBLING = "dribble"
 ENDS_TURNED = frozenset({ON_THE_SPOT, SPINNING})
 """Actions that end where the body has turned as far as is asked for."""
 ALIKE = frozenset({"idle", "nod", "flinch"})
 """Actions that networks make nearly alike from every seed: every other motion is the mirror image."""
-
-
-@dataclass(frozen=True)
-class _Wish:
-    """Everything that the words of a prompt ask for beside its action.
-
-    Attributes:
-        steps: the actions in their order; None = none that is known.
-        action: id of the only one; empty = several, or none that is known.
-        limb: that acts, on one side; empty = either.
-        count: repetitions; None = any number.
-        turn: how far the body turns; None = as it comes.
-        course: on which it goes; None = as it comes.
-        metres: that it goes; None = as many as it comes.
-        pace: at which it is done.
-        gaze: where the head turns.
-        joined: a transition replaces the first frames.
-        drawn_side: of the movement that is drawn, where it is not simply the limb that acts (`drawn_sides`); empty =
-            either, or that of the limb.
-        seed: of the motion.
-    """
-
-    steps: tuple[Step, ...] | None = None
-    action: str = ""
-    limb: NamedLimb | None = None
-    count: int | None = None
-    turn: Turn | None = None
-    pace: AskedPace = field(default_factory=AskedPace)
-    gaze: tuple[Glance, ...] = ()
-    joined: bool = False
-    drawn_side: str = ""
-    course: WayCourse | None = None
-    metres: float | None = None
-    seed: int = 0
-
-    @classmethod
-    def of(cls, request: Request) -> _Wish:
-        """Read the prompt. Of streams, and of motions around kept frames, nothing is changed."""
-        if request.kept or request.free or request.recording is not None:
-            return cls()
-        text = request.text
-        steps = wanted_of(text.actions or (text.rewritten,))
-        action = _action_of(text, steps) or _row_of_blows(steps or ())
-        if action in ("", "idle") and (steps is None or action):
-            action = stated_action(text.said) or action
-        prompt, gaze = text.said, stated_gaze(text.said)
-        if not action:
-            return cls(steps, limb=limb_of(prompt) if steps is None else None, gaze=gaze)
-        count = stated_count(prompt, action) if action in COUNTABLE else None
-        if count is None and action in HOLDING & COUNTED.keys() and held_pose(prompt) is not None:
-            count = 1
-        if action == SPINNING:
-            count = count or stated_spins(prompt)
-        turn, pace = stated_turn(without_gaze(prompt), action), AskedPace.of(prompt, action)
-        if action == SPINNING and count is not None:
-            turn = Turn(count * WHOLE, count * WHOLE)
-        course = stated_course(without_gaze(prompt), action) if count is None else None
-        metres = stated_distance(prompt, action) if count is None and not _closes(course) else None
-        own = drawn_side(prompt, action)
-        limb = limb_of(prompt, action) if own is None else None
-        joined = bool(request.beside[0])
-        return cls(steps, action, limb, count, turn, pace, gaze, joined, own or "", course, metres, request.seed)
-
-    @property
-    def side(self) -> str:
-        """`left` or `right` if an action is asked for on one side, else empty."""
-        return next((each.side for step in self.steps or () for each in step if each.side in ("left", "right")), "")
-
-    def fine(self, request: Request) -> FineWish:
-        """Return what is asked for of a movement that is drawn."""
-        fixed = request.frames is not None and not request.open
-        return FineWish(self.count, self.drawn_side or self.side, request.text.said, fixed, request.beside)
-
-    def for_network(self, request: Request, limits: Limits) -> Request:
-        """Return the request that the network draws: as many frames as become the length asked for, if that is
-        fixed, and those in which it does not move yet."""
-        asked = self._for_length(request, limits)
-        if asked.frames is None or self.count is not None:
-            return asked
-        return replace(asked, frames=frames_to_begin(self.action, asked.frames, limits))
-
-    def length(self, request: Request, limits: Limits) -> int | None:
-        """Return the frames of the motion that becomes the length asked for."""
-        return self._for_length(request, limits).frames
-
-    def _for_length(self, request: Request, limits: Limits) -> Request:
-        if self.count is not None and self.action in STEPPING and request.open and request.frames is not None:
-            return replace(request, frames=limits.within(frames_of_steps(self.count, limits.fps)))
-        if self.course is not None and self.course.kind in CLOSED and (request.open or request.frames is None):
-            return replace(request, frames=frames_of_circle(self.course, self.action, limits))
-        fixed = None if request.open else request.frames
-        far = frames_of_distance(self.metres, self.action, limits, fixed) if self.metres else None
-        if far is not None:
-            return replace(request, frames=far)
-        hold = stated_hold(request.text.said) if self.action not in HOLDING else None
-        if hold is not None and request.open:  # a pose that is not drawn is there all the time
-            return replace(request, frames=limits.within(max(round(hold * limits.fps), request.frames or 0)))
-        if self.pace.most == 1.0 or request.open or request.frames is None:
-            return request
-        return replace(request, frames=limits.within(round(request.frames * self.pace.most)))
-
-
-def action_of(text: TextFeatures) -> str:
-    """Return the id of the only action that a text asks for; empty if there are several or none."""
-    return _action_of(text, wanted_of(text.actions or (text.rewritten,)))
-
-
-def is_winding(text: TextFeatures) -> bool:
-    """Return True if a text asks for a way off to a side, in a circle or in a zigzag."""
-    course = stated_course(without_gaze(text.said), action_of(text))
-    return course is not None and course.kind != STRAIGHT_ON
-
-
-def _closes(course: WayCourse | None) -> bool:
-    """Return True if a way comes back to where it began: as far as it is large."""
-    return course is not None and course.kind in CLOSED
-
-
-def _action_of(text: TextFeatures, steps: Sequence[Step] | None) -> str:
-    return load_vocabulary().said_first(text.rewritten) or _one_action(steps or ())
-
-
-def _one_action(steps: Sequence[Step]) -> str:
-    """Return the id of the only action; a way before a turn ("walks ahead and then changes direction") is part of it.
-    Empty if there are several or none."""
-    named = {each.action for step in steps for each in step}
-    if TURNING in named and named <= WAYS | {TURNING}:
-        return TURNING
-    return named.pop() if len(named) == 1 == len(steps) else ""
-
-
-def _row_of_blows(steps: Sequence[Step]) -> str:
-    """Return the id of the only action of several steps if it is drawn, kind by kind: "a jab, a cross and a hook"."""
-    named = {each.action for step in steps for each in step}
-    return named.pop() if named == {"punch"} else ""
 
 
 def generate_as_asked(
@@ -261,7 +111,7 @@ def generate_as_asked(
     Raises:
         InvalidInput: as `Limits.check`.
     """
-    wishes = [_Wish.of(request) for request in requests]
+    wishes = [Wish.of(request) for request in requests]
     whole = [_whole(generator, request, wish) for request, wish in zip(requests, wishes, strict=True)]
     left = [row for row, drawn in enumerate(whole) if drawn is None]
     asked = [wishes[row].for_network(requests[row], generator.limits) for row in left]
@@ -273,7 +123,7 @@ def generate_as_asked(
     ]
 
 
-def _whole(generator: Generator[S], request: Request, wish: _Wish) -> DrawnWhole | None:
+def _whole(generator: Generator[S], request: Request, wish: Wish) -> DrawnWhole | None:
     """Return the motion that is drawn for a request before a network is asked; None if none is.
 
     Raises:
@@ -330,7 +180,7 @@ def draws(generator: Generator[Any], request: Request) -> bool:
 
 
 def _as_asked(
-    generator: Generator[S], request: Request, wish: _Wish, whole: DrawnWhole | None, made: MotionFeatures | None
+    generator: Generator[S], request: Request, wish: Wish, whole: DrawnWhole | None, made: MotionFeatures | None
 ) -> MotionFeatures | None:
     """Return a motion that was drawn, or the one that the network made, changed where the wish is not fulfilled and can
     be; None if there is neither.
@@ -379,7 +229,7 @@ def _as_asked(
 
 
 def _in_posture(
-    generator: Generator[S], request: Request, wish: _Wish, motion: MotionFeatures | None
+    generator: Generator[S], request: Request, wish: Wish, motion: MotionFeatures | None
 ) -> MotionFeatures | None:
     """Return the motion of a gesture in the posture of its row, and one that would go on and on as a short one; any
     other motion as it is."""
@@ -394,7 +244,7 @@ def _in_posture(
     return AskedMotion(features, {**changes_of(motion), **({"posture": held.own} if held.own else {})})
 
 
-def _is_mirrored(features: Float32, layout: FeatureLayout, wish: _Wish, seed: int, *, drawn: bool) -> bool:
+def _is_mirrored(features: Float32, layout: FeatureLayout, wish: Wish, seed: int, *, drawn: bool) -> bool:
     """Return True if the mirror image of a motion is what the prompt asks for, or does as well and differs from that of
     the seed before."""
     if drawn and wish.drawn_side:
@@ -404,7 +254,7 @@ def _is_mirrored(features: Float32, layout: FeatureLayout, wish: _Wish, seed: in
     return not drawn and wish.action in ALIKE and seed % 2 == 1
 
 
-def _drawn(features: Float32, layout: FeatureLayout, wish: _Wish, request: Request) -> Float32 | None:
+def _drawn(features: Float32, layout: FeatureLayout, wish: Wish, request: Request) -> Float32 | None:
     """Return the motion of a network with what is drawn of its action; None if it stays."""
     if wish.action in STEERED and request.drawing and dribbles_ahead(request.text.said):
         return drawn_features(features, layout, DRIBBLING, wish.fine(request), request.seed)
@@ -413,7 +263,7 @@ def _drawn(features: Float32, layout: FeatureLayout, wish: _Wish, request: Reque
     return drawn_features(features, layout, wish.action, wish.fine(request), request.seed)
 
 
-def _evened(features: Float32, layout: FeatureLayout, wish: _Wish, changes: dict[str, Any]) -> Float32:
+def _evened(features: Float32, layout: FeatureLayout, wish: Wish, changes: dict[str, Any]) -> Float32:
     """Return the motion without the moments in which a run loses its beat."""
     even = even_run(features, layout) if wish.action in EVEN and wish.count is None else None
     if even is None or len(features) < SHORTEST:
@@ -423,7 +273,7 @@ def _evened(features: Float32, layout: FeatureLayout, wish: _Wish, changes: dict
 
 
 def _as_often(
-    features: Float32, layout: FeatureLayout, wish: _Wish, fixed: int | None, changes: dict[str, Any]
+    features: Float32, layout: FeatureLayout, wish: Wish, fixed: int | None, changes: dict[str, Any]
 ) -> Float32:
     """Return the motion with as many repetitions as are asked for; `changes` says so, as in all of these."""
     as_drawn = "drawn" in changes and wish.action in FINE  # as often as asked for
@@ -439,7 +289,7 @@ def _as_often(
 
 
 def _turned(
-    features: Float32, layout: FeatureLayout, wish: _Wish, fixed: int | None, changes: dict[str, Any]
+    features: Float32, layout: FeatureLayout, wish: Wish, fixed: int | None, changes: dict[str, Any]
 ) -> Float32:
     """Return the motion with the turn that is asked for, behind what a transition replaces of it."""
     if wish.turn is None and wish.course is None:
@@ -468,7 +318,7 @@ def _turned(
 
 
 def _on_floor(
-    features: Float32, layout: FeatureLayout, wish: _Wish, fixed: int | None, changes: dict[str, Any]
+    features: Float32, layout: FeatureLayout, wish: Wish, fixed: int | None, changes: dict[str, Any]
 ) -> Float32:
     """Return the motion of a body that comes down to the floor; the moments of a counted one are found by the height of
     the feet, which stays."""
@@ -488,9 +338,7 @@ def _on_floor(
     return features
 
 
-def _ended(
-    features: Float32, layout: FeatureLayout, wish: _Wish, fixed: int | None, changes: dict[str, Any]
-) -> Float32:
+def _ended(features: Float32, layout: FeatureLayout, wish: Wish, fixed: int | None, changes: dict[str, Any]) -> Float32:
     """Return the motion without the beginning of what would come after its action."""
     ends = ended(features, layout, wish.action) if fixed is None else None
     if ends is None or len(ends) < SHORTEST:
@@ -502,7 +350,7 @@ def _ended(
 def _retimed(
     features: Float32,
     layout: FeatureLayout,
-    wish: _Wish,
+    wish: Wish,
     fixed: int | None,
     changes: dict[str, Any],
     whole: DrawnWhole | None,
@@ -524,7 +372,7 @@ def _retimed(
 
 
 def _as_far(
-    features: Float32, layout: FeatureLayout, wish: _Wish, fixed: int | None, changes: dict[str, Any]
+    features: Float32, layout: FeatureLayout, wish: Wish, fixed: int | None, changes: dict[str, Any]
 ) -> Float32 | None:
     """Return the motion of a way that goes as far as is asked for, at the pace that is; None if it cannot."""
     if wish.metres is None or wish.action not in SPEEDS or len(features) < SHORTEST:
@@ -540,7 +388,7 @@ def _as_far(
     return far
 
 
-def _is_better_mirrored(features: Float32, layout: FeatureLayout, wish: _Wish) -> bool:
+def _is_better_mirrored(features: Float32, layout: FeatureLayout, wish: Wish) -> bool:
     """Return True if the motion turns to the other side, or only the mirror image matches the prompt, or both or
     neither does, and the other limb acts than the one that the prompt names."""
     if layout.skeleton.name != HUMANML3D.name or len(features) < SHORTEST:
@@ -560,7 +408,7 @@ def _is_better_mirrored(features: Float32, layout: FeatureLayout, wish: _Wish) -
     return SHOWN > mirrored > as_made
 
 
-def _shows(features: Float32, layout: FeatureLayout, wish: _Wish, request: Request) -> bool:
+def _shows(features: Float32, layout: FeatureLayout, wish: Wish, request: Request) -> bool:
     """Return True if a motion shows its small movement well, and as often as it is asked for, by itself."""
     if len(features) < SHORTEST:
         return False

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 from marey.checks.kinematics import smooth
 from marey.drawing.holds import LYING
-from marey.generation.asked import action_of
 from marey.generation.done import AGAIN_HELD, BEGINS_S, FALL, PACES, raised_s
 from marey.generation.gaits import GAITS, STAMP_S, stomping
 from marey.generation.hits import states_hit
@@ -29,6 +28,7 @@ from marey.generation.marching import marches_straight
 from marey.generation.port import MotionFeatures, Request
 from marey.generation.strides import drags_feet
 from marey.generation.timed import TimedText
+from marey.generation.wish import action_of
 from marey.motion.features import FeatureLayout, encode_all
 from marey.motion.rotations import normalize
 from marey.motion.skeleton import HUMANML3D

@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from marey.generation.asked import action_of, changes_of, draws_bearings, is_winding
+from marey.generation.asked import changes_of, draws_bearings
 from marey.generation.bearing import actions_alone, borne, borne_spans, with_bearing
 from marey.generation.carrying import puts_load
 from marey.generation.gazing import with_gaze
@@ -16,6 +16,7 @@ from marey.generation.port import Generator, MotionFeatures, Request, S
 from marey.generation.shots.provenance import describe_timeline, least_match, with_rows
 from marey.generation.shots.timelines import TimelineMotion
 from marey.generation.software import origin_of
+from marey.generation.wish import action_of, is_winding
 from marey.motion.body import NamedBody, standard_body
 from marey.motion.clip import QUALITY, MotionClip
 from marey.motion.finish import CLEANED, finish_motion

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from marey.generation.asked import action_of, draws_bearings
+from marey.generation.asked import draws_bearings
 from marey.generation.bearing import fitting
 from marey.generation.done import BEGINS_S, done_s
 from marey.generation.port import Generator, Request
+from marey.generation.wish import action_of
 from marey.text.features import TextFeatures
 from marey.vocabulary.bearing_words import stated_bearings
 

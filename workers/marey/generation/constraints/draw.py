@@ -20,7 +20,7 @@ from marey.generation.export import finish
 from marey.generation.passes import PassControl
 from marey.generation.port import GenerationControl, Generator, Limits, MotionFeatures, NoControl, Request, S
 from marey.generation.shots.dispatch import generate_any, resolve_request
-from marey.generation.shots.timelines import plan_timeline
+from marey.generation.shots.timeline_plan import plan_timeline
 from marey.items.constraint_frames import for_clip, frames_to_last, last_frame
 from marey.items.constraints import ROOT_PATH
 from marey.motion.body import NamedBody, standard_body, travel_scale

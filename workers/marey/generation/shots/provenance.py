@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.generation.asked import action_of, is_winding
 from marey.generation.carrying import WALKS, puts_load
 from marey.generation.named import names_movement
 from marey.generation.port import Limits, Request
 from marey.generation.row_postures import is_as_alone
 from marey.generation.shots.flowing import BENT_ON
 from marey.generation.shots.freezing import AS_BEFORE
-from marey.generation.shots.timelines import gaps_of, plan_timeline
+from marey.generation.shots.timeline_plan import gaps_of, plan_timeline
 from marey.generation.timed import TimedText
+from marey.generation.wish import action_of, is_winding
 from marey.items.timeline import TimelineRow, text_of
 from marey.motion.clip import SELECTION, MotionClip
 from marey.quality.postures import rises_of

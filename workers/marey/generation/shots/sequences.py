@@ -14,7 +14,7 @@ from dataclasses import replace
 from itertools import accumulate, pairwise
 from typing import Any
 
-from marey.generation.asked import action_of, draws
+from marey.generation.asked import draws
 from marey.generation.lengths import resolved_length
 from marey.generation.port import Generator, Limits, Request
 from marey.generation.posture import NO_POSTURE
@@ -22,6 +22,7 @@ from marey.generation.postured import gestures_s
 from marey.generation.row_postures import Row, rises, row_postures
 from marey.generation.shots.way_lengths import with_room_back
 from marey.generation.timed import TimedText, part_seed
+from marey.generation.wish import action_of
 from marey.items.timeline import MIN_ROW_SECONDS
 from marey.text.features import TextFeatures
 from marey.vocabulary.entries import load_vocabulary

@@ -9,7 +9,7 @@ all timelines of a batch are generated together, and each depends on its own row
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from marey.core.errors import InvalidInput
 from marey.drawing.holds import BACK, CROUCH, FLOOR, FOURS, FRONT, KNEE, KNEES
-from marey.generation.asked import action_of, changes_of, generate_as_asked
+from marey.generation.asked import changes_of, generate_as_asked
 from marey.generation.distances import with_distance
 from marey.generation.footing import RUNS
 from marey.generation.passes import PassControl
@@ -29,21 +29,20 @@ from marey.generation.shots.flowing import BENT_ON, flowing, flowing_as_shown, w
 from marey.generation.shots.freezing import AS_BEFORE, freezes, frozen
 from marey.generation.shots.going_on import is_way, without_halt, without_wait
 from marey.generation.shots.headings import JoinedTurn, heading_change, with_whole_turns
-from marey.generation.shots.levels import lifted, raised_rows
+from marey.generation.shots.levels import raised_rows
 from marey.generation.shots.lifted_steps import with_steps
 from marey.generation.shots.raised_arms import FIGHTING, RAISING, STEPPING_ASIDE, TURNING, guarded, kept_arms
-from marey.generation.shots.way_lengths import WayRow, as_long_as, metres_between, ways_back
-from marey.generation.shots.windows import CONTEXT, Float32, FrameGap, Window, crossfaded, fill, most_frames
-from marey.generation.timed import TimedText, cut_of, part_seed
+from marey.generation.shots.strands import Fate, Strand, TimelineRow, Transition
+from marey.generation.shots.timeline_plan import even_parts, plan_timeline
+from marey.generation.shots.way_lengths import as_long_as, metres_between, ways_back
+from marey.generation.shots.windows import CONTEXT, Float32, Window, fill, most_frames
+from marey.generation.timed import TimedText
+from marey.generation.wish import action_of
 from marey.items.timeline import TIMELINE_HINT, no_timelines
 from marey.motion.features import FeatureLayout, HeadingLayout
 from marey.motion.skeleton import HUMANML3D
 from marey.text.features import TextFeatures
-from marey.vocabulary.bearing_words import stated_bearings
-from marey.vocabulary.counts import STEPPING, stated_count
-from marey.vocabulary.distances import stated_distance
 from marey.vocabulary.entries import load_vocabulary
-from marey.vocabulary.scope import STANDING
 
 RISE, RISE_SPEED = 0.3, 0.6
 """Metres, and metres a second: between movements of a sequence whose pelvis is farther apart in height, time is left to
@@ -72,51 +71,6 @@ class TimelineMotion:
     timeline: tuple[TimedText, ...]
 
 
-@dataclass(frozen=True)
-class TimelinePart:
-    """Frames of a timeline with one origin: a row, or the transition between two rows.
-
-    Attributes:
-        start: first frame.
-        end: frame after the last.
-        seed: of its first window; windows after it have seeds of their own.
-    """
-
-    start: int
-    end: int
-    seed: int
-
-    @property
-    def frames(self) -> int:
-        """Return the number of frames."""
-        return self.end - self.start
-
-
-@dataclass(frozen=True)
-class TimelinePlan:
-    """Frames of the rows and transitions of a timeline."""
-
-    rows: tuple[TimelinePart, ...]
-    transitions: tuple[TimelinePart, ...]
-
-    @property
-    def frames(self) -> int:
-        """Return the frames of the whole."""
-        return self.rows[-1].end
-
-
-def plan_timeline(timeline: Sequence[TimedText], seed: int, limits: Limits) -> TimelinePlan:
-    """Return the frames of the rows and transitions of a timeline."""
-    times = [(round(row.start * limits.fps), round(row.end * limits.fps)) for row in timeline]
-    seeds = [part_seed(seed, "row", n) if row.seed is None else row.seed for n, row in enumerate(timeline)]
-    rows = tuple(TimelinePart(*time, own) for time, own in zip(times, seeds, strict=True))
-    transitions = tuple(
-        _transition(before, after, part_seed(seed, "transition", number), limits.keeps)
-        for number, (before, after) in enumerate(pairwise(rows))
-    )
-    return TimelinePlan(rows, transitions)
-
-
 def check_timelines(generator: Generator[Any]) -> None:
     """Check that a model can generate timelines.
 
@@ -125,12 +79,6 @@ def check_timelines(generator: Generator[Any]) -> None:
     """
     if not generator.limits.keeps:
         raise InvalidInput(no_timelines(generator.bundle.manifest.model), where="timeline", hint=TIMELINE_HINT)
-
-
-def _transition(before: TimelinePart, after: TimelinePart, seed: int, grid: int) -> TimelinePart:
-    """Return the frames that are generated without a prompt between two rows: a gap, and the beginning of the row after
-    it, if the gap is shorter than that."""
-    return TimelinePart(before.end, max(after.start, before.end + cut_of(after.frames, grid)), seed)
 
 
 def generate_timelines(
@@ -150,9 +98,9 @@ def generate_timelines(
     windows = _Windows(generator, settings, control or NoControl(), timelines)
     windows.make([strand for timeline in timelines for strand in timeline.rows])
     for timeline in timelines:
-        if timeline.open and not timeline.dropped:
+        if timeline.open and not timeline.fate.dropped:
             timeline.settle(generator.layout)
-        if timeline.is_sequence and not timeline.dropped:
+        if timeline.is_sequence and not timeline.fate.dropped:
             timeline.lift(generator.layout)
     windows.make([strand for timeline in timelines for strand in timeline.open_transitions(generator.layout)])
     return [timeline.motion(generator.layout) for timeline in timelines]
@@ -167,141 +115,6 @@ def row_requests(request: Request, limits: Limits) -> list[Request]:
     ]
 
 
-class _Strand:
-    """A part of a timeline while it grows, window by window.
-
-    Attributes:
-        timeline: that it belongs to.
-        lengths: frames of each window.
-        windows: those that are made.
-    """
-
-    def __init__(self, timeline: _Timeline, part: TimelinePart, text: TextFeatures, most: tuple[int, int]) -> None:
-        """`most`: frames of a part that is one window, and of each window of a longer one."""
-        self.timeline = timeline
-        self.part = part
-        self.text = text
-        self.windows: list[Window] = []
-        self.lengths = even_parts(part.frames, *most)
-
-    @property
-    def seed(self) -> int:
-        """Return the seed of the next window."""
-        number = len(self.windows)
-        return self.part.seed if number == 0 else part_seed(self.part.seed, "window", number)
-
-    @property
-    def is_last(self) -> bool:
-        """Return True if the next window is the last."""
-        return len(self.windows) == len(self.lengths) - 1
-
-    @property
-    def start(self) -> int:
-        """Return the first frame of the next window, in the timeline."""
-        return self.part.start + sum(self.lengths[: len(self.windows)])
-
-
-class _Row(_Strand):
-    """A row: its first window is a motion of the prompt, those after it continue it."""
-
-    def __init__(self, timeline: _Timeline, part: TimelinePart, timed: TimedText, limits: Limits) -> None:
-        super().__init__(timeline, part, timed.text, (limits.max_frames, limits.max_frames - CONTEXT))
-        self.open = timed.open
-        self.held = timed.held
-        self.beside: tuple[str, str] = ("", "")
-        self.features: Float32 | None = None
-        self.base = 0.0
-        self.changes: Mapping[str, Any] = {}
-        self.entered = 0
-        self.turn = 0.0
-
-    @property
-    def is_drawn(self) -> bool:
-        """True if rules draw its movement."""
-        return self.open and "drawn" in self.changes
-
-    @property
-    def is_trimmed(self) -> bool:
-        """True if its rest may be left out: its features show the movement, no gesture is drawn on it later."""
-        waits = action_of(self.text) in ("", STANDING) or any(
-            each.bearing.gesture for each in stated_bearings(self.text.said)
-        )
-        return self.is_drawn and not (waits or self.held.is_drawn)
-
-    def as_way(self, layout: FeatureLayout) -> WayRow:
-        """Return what the row is for the lengths of ways."""
-        action = action_of(self.text)
-        turns = self.is_drawn and action in TURNING and self.features is not None
-        turn = heading_change(self.features, layout) if turns and self.features is not None else 0.0
-        counted = stated_count(self.text.said, action) if action in STEPPING else None
-        return WayRow(is_way(self.text), turn, stated_distance(self.text.said, action) if counted is None else None)
-
-    def request(self) -> Request:
-        """Return the request of the first window."""
-        own_length = self.open and len(self.lengths) == 1
-        return Request(
-            self.text,
-            self.seed,
-            self.lengths[0],
-            open=own_length,
-            beside=self.beside,
-            held=self.held,
-            drawing=self.timeline.drawing,
-        )
-
-    def gap(self) -> FrameGap:
-        """Return the gap of a window after the first."""
-        assert self.features is not None
-        return FrameGap(self.features, self.lengths[len(self.windows)], self.features[:0], self.text, self.seed)
-
-    def add(self, window: Window) -> None:
-        """Append a window."""
-        if self.features is None:
-            self.features = window.features
-        else:
-            grown = np.concatenate([self.features, window.new])
-            self.features = crossfaded(grown, window, len(self.features) - window.first)
-        self.windows.append(window)
-
-
-class _Transition(_Strand):
-    """A transition: windows without a prompt; the last one has the frames of the next row behind it."""
-
-    def __init__(self, timeline: _Timeline, number: int, limits: Limits, layout: FeatureLayout) -> None:
-        part = timeline.plan.transitions[number]
-        before, after = timeline.rows[number : number + 2]
-        super().__init__(timeline, part, after.text, (most_frames(limits, 2), limits.max_frames - CONTEXT))
-        assert before.features is not None
-        assert after.features is not None
-        self._layout, self._base = layout, after.base
-        self._before = self._lifted(before.features[: part.start - before.part.start], -self._base)
-        self._after = self._lifted(after.features[part.end - after.part.start :], -self._base)
-
-    def _lifted(self, features: Float32, metres: float) -> Float32:
-        """Return features (T, D) at another height: networks know bodies on a floor."""
-        return lifted(features, metres, self._layout) if metres else features
-
-    def gap(self) -> FrameGap:
-        """Return the gap of the next window."""
-        made = [window.new for window in self.windows]
-        before = np.concatenate([self._before[-CONTEXT:], *made]) if made else self._before
-        after = self._after if self.is_last else self._after[:0]
-        return FrameGap(before, self.lengths[len(self.windows)], after, self.text, self.seed, free=True)
-
-    def add(self, window: Window) -> None:
-        """Append a window."""
-        self.windows.append(window)
-
-    def write(self, frames: Float32) -> Float32:
-        """Return the frames of the timeline with this transition in them."""
-        start = self.part.start
-        for window, length in zip(self.windows, self.lengths, strict=True):
-            raised = replace(window, features=self._lifted(window.features, self._base))
-            frames = crossfaded(frames, raised, start - window.first)
-            start += length
-        return frames
-
-
 class _Timeline:
     """A timeline while it is generated.
 
@@ -312,23 +125,25 @@ class _Timeline:
     def __init__(self, request: Request, limits: Limits) -> None:
         assert request.timeline is not None
         self.limits = limits
-        self.dropped = False
+        self.fate = Fate(drawing=request.drawing)
         self.is_sequence = request.is_sequence
         self.open = request.is_sequence and request.frames is None
         self.timeline = request.timeline
         self.seed = request.seed
-        self.drawing = request.drawing
         self.said = request.text.said
         self.back: dict[int, int] = {}
         self.plan = plan_timeline(request.timeline, request.seed, limits)
-        self.rows = [_Row(self, part, row, limits) for part, row in zip(self.plan.rows, request.timeline, strict=True)]
+        self.rows = [
+            TimelineRow(self.fate, part, row, limits)
+            for part, row in zip(self.plan.rows, request.timeline, strict=True)
+        ]
         prompts = ["", *(row.text.said for row in request.timeline), ""]
         for number, (strand, row) in enumerate(zip(self.rows, request.timeline, strict=True)):
             strand.beside = prompts[number], prompts[number + 2]
             if row.made is not None:
                 strand.add(Window(row.made, 0, len(row.made)))
                 strand.changes = row.changes
-        self.transitions: list[_Transition] = []
+        self.transitions: list[Transition] = []
 
     @property
     def windows(self) -> int:
@@ -466,7 +281,7 @@ class _Timeline:
                     before.features, row.features = held.before, held.after
                     row.changes = {**row.changes, "posture": AS_BEFORE}
 
-    def _row(self, number: int) -> _Row | None:
+    def _row(self, number: int) -> TimelineRow | None:
         """Return a row; None before the first and behind the last."""
         return self.rows[number] if 0 <= number < len(self.rows) else None
 
@@ -482,12 +297,12 @@ class _Timeline:
         for row, raised in zip(self.rows, raised_rows(made, layout), strict=True):
             row.features, row.base = raised.features, raised.base
 
-    def open_transitions(self, layout: FeatureLayout) -> list[_Transition]:
+    def open_transitions(self, layout: FeatureLayout) -> list[Transition]:
         """Return the transitions, once the rows are made; none of a dropped timeline."""
-        if not self.dropped:
+        if not self.fate.dropped:
             self.transitions = [
-                _Transition(self, number, self.limits, layout)
-                for number, (_, after) in enumerate(pairwise(self.rows))
+                Transition(part, before, after, self.limits, layout)
+                for part, (before, after) in zip(self.plan.transitions, pairwise(self.rows), strict=True)
                 if not (after.held.meets or after.entered)
             ]
         return self.transitions
@@ -511,7 +326,7 @@ class _Timeline:
 
     def motion(self, layout: FeatureLayout) -> TimelineMotion | None:
         """Put rows and transitions together; None if the timeline was dropped."""
-        if self.dropped:
+        if self.fate.dropped:
             return None
         first = self.rows[0].features
         assert first is not None
@@ -550,47 +365,41 @@ class _Windows:
         self._total = sum(timeline.windows for timeline in timelines)
         self._done = 0
 
-        def first(rows: Sequence[_Row], watched: GenerationControl) -> list[Window | None]:
+        def first(rows: Sequence[TimelineRow], watched: GenerationControl) -> list[Window | None]:
             made = generate_as_asked(generator, [row.request() for row in rows], settings, control=watched)
             for row, motion in zip(rows, made, strict=True):
                 row.changes = {} if motion is None else changes_of(motion)
             return [None if each is None else Window(each.features, 0, len(each.features)) for each in made]
 
-        def following(strands: Sequence[_Row | _Transition], watched: GenerationControl) -> list[Window | None]:
+        def following(strands: Sequence[TimelineRow | Transition], watched: GenerationControl) -> list[Window | None]:
             return fill(generator, [strand.gap() for strand in strands], settings, control=watched)
 
         self._first, self._following = first, following
 
-    def make(self, strands: Sequence[_Row] | Sequence[_Transition]) -> None:
+    def make(self, strands: Sequence[TimelineRow] | Sequence[Transition]) -> None:
         """Generate all windows of parts that do not depend on each other."""
-        while left := [each for each in strands if not each.timeline.dropped and len(each.windows) < len(each.lengths)]:
+        while left := [each for each in strands if not each.fate.dropped and len(each.windows) < len(each.lengths)]:
             watched = PassControl(self._control, self._owners(left), self._done, self._total)
-            new = [each for each in left if isinstance(each, _Row) and not each.windows]
+            new = [each for each in left if isinstance(each, TimelineRow) and not each.windows]
             if new:
                 left, watched = new, PassControl(self._control, self._owners(new), self._done, self._total)
             made = self._first(new, watched) if new else self._following(left, watched)
             for strand, window in zip(left, made, strict=True):
                 if window is None:
-                    strand.timeline.dropped = True
+                    strand.fate.dropped = True
                 else:
                     strand.add(window)
             self._done += len(made)
 
-    def _owners(self, strands: Sequence[_Strand]) -> list[int]:
-        place = {id(timeline): number for number, timeline in enumerate(self._timelines)}
-        return [place[id(strand.timeline)] for strand in strands]
+    def _owners(self, strands: Sequence[Strand]) -> list[int]:
+        place = {id(timeline.fate): number for number, timeline in enumerate(self._timelines)}
+        return [place[id(strand.fate)] for strand in strands]
 
 
 def _pelvis_heights(features: Float32 | None, layout: FeatureLayout) -> NDArray[np.float32]:
     """Return the height (T,) of the pelvis over the floor, metres."""
     assert features is not None
     return layout.decode(features)[:, 0, 1]
-
-
-def is_onward(before: TextFeatures, after: TextFeatures) -> bool:
-    """Return True if a drawn movement goes out of the speed of the way before it."""
-    action = action_of(after)
-    return is_way(before) and (action in FALLING or (action in THROWING and action_of(before) in RUNS))
 
 
 def _is_raised(text: TextFeatures) -> bool:
@@ -600,18 +409,7 @@ def _is_raised(text: TextFeatures) -> bool:
     return action is not None and vocabulary.need(action).support == "raised"
 
 
-def even_parts(frames: int, single: int, most: int) -> list[int]:
-    """Return the lengths of windows that make up so many frames, as equal as can be.
-
-    Args:
-        frames: of all windows.
-        single: most frames of one window that stands alone.
-        most: most frames of each of several windows.
-    """
-    count = 1 if frames <= single else -(-frames // most)
-    return [frames * (number + 1) // count - frames * number // count for number in range(count)]
-
-
-def gaps_of(plan: TimelinePlan) -> Iterator[tuple[int, int]]:
-    """Yield the first frame, and the frame after the last, of each gap between rows."""
-    return ((before.end, after.start) for before, after in pairwise(plan.rows) if before.end < after.start)
+def is_onward(before: TextFeatures, after: TextFeatures) -> bool:
+    """Return True if a drawn movement goes out of the speed of the way before it."""
+    action = action_of(after)
+    return is_way(before) and (action in FALLING or (action in THROWING and action_of(before) in RUNS))

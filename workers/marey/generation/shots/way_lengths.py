@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.generation.asked import action_of
 from marey.generation.distances import as_far, distance_of, frames_of_distance, passed_on
 from marey.generation.port import Limits
 from marey.generation.shots.going_on import is_way
 from marey.generation.shots.raised_arms import TURNING
+from marey.generation.wish import action_of
 from marey.motion.courses import course_of
 from marey.motion.features import FeatureLayout
 from marey.text.features import TextFeatures
