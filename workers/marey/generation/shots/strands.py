@@ -73,7 +73,7 @@ class Strand:
         return self.part.start + sum(self.lengths[: len(self.windows)])
 
 
-class TimelineRow(Strand):
+class RowStrand(Strand):
     """A row: its first window is a motion of the prompt, those after it continue it."""
 
     def __init__(self, fate: Fate, part: TimelinePart, timed: TimedText, limits: Limits) -> None:
@@ -140,7 +140,7 @@ class Transition(Strand):
     """A transition: windows without a prompt; the last one has the frames of the next row behind it."""
 
     def __init__(
-        self, part: TimelinePart, before: TimelineRow, after: TimelineRow, limits: Limits, layout: FeatureLayout
+        self, part: TimelinePart, before: RowStrand, after: RowStrand, limits: Limits, layout: FeatureLayout
     ) -> None:
         super().__init__(after.fate, part, after.text, (most_frames(limits, 2), limits.max_frames - CONTEXT))
         assert before.features is not None

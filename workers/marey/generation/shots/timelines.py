@@ -32,7 +32,7 @@ from marey.generation.shots.headings import JoinedTurn, heading_change, with_who
 from marey.generation.shots.levels import raised_rows
 from marey.generation.shots.lifted_steps import with_steps
 from marey.generation.shots.raised_arms import FIGHTING, RAISING, STEPPING_ASIDE, TURNING, guarded, kept_arms
-from marey.generation.shots.strands import Fate, Strand, TimelineRow, Transition
+from marey.generation.shots.strands import Fate, RowStrand, Strand, Transition
 from marey.generation.shots.timeline_plan import even_parts, plan_timeline
 from marey.generation.shots.way_lengths import as_long_as, metres_between, ways_back
 from marey.generation.shots.windows import CONTEXT, Float32, Window, fill, most_frames
@@ -134,8 +134,7 @@ class _Timeline:
         self.back: dict[int, int] = {}
         self.plan = plan_timeline(request.timeline, request.seed, limits)
         self.rows = [
-            TimelineRow(self.fate, part, row, limits)
-            for part, row in zip(self.plan.rows, request.timeline, strict=True)
+            RowStrand(self.fate, part, row, limits) for part, row in zip(self.plan.rows, request.timeline, strict=True)
         ]
         prompts = ["", *(row.text.said for row in request.timeline), ""]
         for number, (strand, row) in enumerate(zip(self.rows, request.timeline, strict=True)):
@@ -281,7 +280,7 @@ class _Timeline:
                     before.features, row.features = held.before, held.after
                     row.changes = {**row.changes, "posture": AS_BEFORE}
 
-    def _row(self, number: int) -> TimelineRow | None:
+    def _row(self, number: int) -> RowStrand | None:
         """Return a row; None before the first and behind the last."""
         return self.rows[number] if 0 <= number < len(self.rows) else None
 
@@ -365,22 +364,22 @@ class _Windows:
         self._total = sum(timeline.windows for timeline in timelines)
         self._done = 0
 
-        def first(rows: Sequence[TimelineRow], watched: GenerationControl) -> list[Window | None]:
+        def first(rows: Sequence[RowStrand], watched: GenerationControl) -> list[Window | None]:
             made = generate_as_asked(generator, [row.request() for row in rows], settings, control=watched)
             for row, motion in zip(rows, made, strict=True):
                 row.changes = {} if motion is None else changes_of(motion)
             return [None if each is None else Window(each.features, 0, len(each.features)) for each in made]
 
-        def following(strands: Sequence[TimelineRow | Transition], watched: GenerationControl) -> list[Window | None]:
+        def following(strands: Sequence[RowStrand | Transition], watched: GenerationControl) -> list[Window | None]:
             return fill(generator, [strand.gap() for strand in strands], settings, control=watched)
 
         self._first, self._following = first, following
 
-    def make(self, strands: Sequence[TimelineRow] | Sequence[Transition]) -> None:
+    def make(self, strands: Sequence[RowStrand] | Sequence[Transition]) -> None:
         """Generate all windows of parts that do not depend on each other."""
         while left := [each for each in strands if not each.fate.dropped and len(each.windows) < len(each.lengths)]:
             watched = PassControl(self._control, self._owners(left), self._done, self._total)
-            new = [each for each in left if isinstance(each, TimelineRow) and not each.windows]
+            new = [each for each in left if isinstance(each, RowStrand) and not each.windows]
             if new:
                 left, watched = new, PassControl(self._control, self._owners(new), self._done, self._total)
             made = self._first(new, watched) if new else self._following(left, watched)
