@@ -17,6 +17,7 @@ from marey.vocabulary.courses import STRAIGHT, WAYS, dribbles_ahead, stated_cour
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.gazes import without_gaze
 from marey.vocabulary.inflection import third_person
+from marey.vocabulary.lengths import without_length
 from marey.vocabulary.scope import STANDING, every_action, match_scope
 from marey.vocabulary.word_lists import load_word_lists
 
@@ -28,6 +29,7 @@ TURNING = "turn"
 """Said beside gaits: "walks and turns the corner"."""
 NODDING = "nod"
 """Read in "shakes his head"."""
+BACK = "walk-backward"
 DRIBBLING = "dribble"
 """Of it models know the stance alone."""
 ALONE = frozenset({STANDING, NODDING})
@@ -75,7 +77,8 @@ def with_plain_action(prompt: str, action: str | None, *, surely: bool = False) 
     Without them where it has them already, and as written where no action is known that it asks for. A verb without
     a subject gets one (`with_subject`), words that mislead are replaced (`PLAINER`), and those that have the head turn,
     or ask for a bearing that fits the action, are left out: both are drawn. So are the words of a way to a side, in a
-    circle or in a zigzag, to which the motion of a plain way is bent.
+    circle or in a zigzag, to which the motion of a plain way is bent, and lengths. Of a way in a manner that is drawn
+    the plain words alone are read.
 
     Args:
         prompt: as `check_prompt` returns it.
@@ -98,13 +101,23 @@ def with_plain_action(prompt: str, action: str | None, *, surely: bool = False) 
         way = action if action in WAYS else "run" if _RUNS.search(prompt) else "walk"
         action, bare = way, without_course(bare, way)  # the way is bent
     plain = load_vocabulary().need(action).plain_words
+    if action == BACK and _RUNS.search(prompt):
+        return plain  # it is drawn, and "jogs" behind the plain words is read as another action
+    if action in WAYS and course is not None and course.kind == STRAIGHT and _is_in_manner(borne, action):
+        return plain
     if not bare or action in DRAWN_AS or (surely and action in ALONE):
         return plain
-    prompt = with_subject(bare)
+    prompt = with_subject(without_length(bare))
     if action in PLAINER:
         pattern, words = PLAINER[action]
         prompt = pattern.sub(words, prompt)
     return prompt if plain in prompt.lower() else f"{plain}, {_lowered(prompt)}"
+
+
+def _is_in_manner(borne: BarePrompt, action: str) -> bool:
+    """Return True if a prompt states a manner of going, which is drawn on a plain way: where it leads ("home across the
+    alley") shows in no motion, and models make something else of such words at its end."""
+    return any(each.bearing.is_manner and each.shown_in(action) == "body" for each in borne.stated)
 
 
 def only_action(prompt: str) -> str | None:

@@ -6,8 +6,8 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 
-from marey.vocabulary.bearings import UNLESS, bearing_macros, bearing_table, bearing_words
-from marey.vocabulary.inflection import forms_of_other, verb_forms
+from marey.vocabulary.bearings import ONLY, UNLESS, bearing_macros, bearing_table, bearing_words
+from marey.vocabulary.inflection import forms_of_other, third_person, verb_forms
 from marey.vocabulary.word_lists import load_word_lists
 
 _WALK = "walk"
@@ -20,6 +20,7 @@ _BE = rf"(?:(?:who|that|which) )?(?:is|are|was|were|being|{SEEMS}(?: to be)?) "
 _PRONOUNS = frozenset(["he", "she", "they", "it", "i", "you", "we", "someone", "somebody"])
 _GAITS = "walk|run|jog|stroll|march|idle|stance|pose|gait|strut|stride|shuffle|standing|walking|running"
 """Nouns of ways before which an adjective is one of the person: "sad walk"."""
+_WAY_VERBS = ("walk", "run", "jog", "stroll", "march", "wander", "stride")
 DOES = "does"
 """Group of the words that ask for a bearing, behind the people of whom they do so."""
 _GAIT = re.compile(r"([\w|-]+)(.*)", re.DOTALL)
@@ -39,10 +40,20 @@ def bearing_patterns() -> Sequence[tuple[str, str, re.Pattern[str]]]:
 @lru_cache(maxsize=1)
 def unless_beside() -> Mapping[str, re.Pattern[str]]:
     """Return the pattern of the words beside which a prompt does not ask for a bearing, by its id."""
+    return _words_of_prompts(UNLESS)
+
+
+@lru_cache(maxsize=1)
+def only_beside() -> Mapping[str, re.Pattern[str]]:
+    """Return the pattern of the words without which a prompt does not ask for a bearing, by its id."""
+    return _words_of_prompts(ONLY)
+
+
+def _words_of_prompts(field: str) -> Mapping[str, re.Pattern[str]]:
     return {
-        name: re.compile(rf"\b(?:{'|'.join(values[UNLESS])})\b")
+        name: re.compile(rf"\b(?:{'|'.join(values[field])})\b")
         for name, values in bearing_table().items()
-        if UNLESS in values
+        if field in values
     }
 
 
@@ -60,9 +71,10 @@ def _patterns_of(kind: str, entries: Sequence[str]) -> Iterator[tuple[str, str]]
             yield kind, rf"(?P<verb>{_longest_first(forms)}){_expanded(tail)}"
     elif kind == "adjectives":
         yield kind, rf"{_VERY}(?:{either})(?:,| and|, and)?(?= (?:[\w-]+ ){{0,2}}(?:{_people()})\b)"
+        yield kind, rf"{_VERY}(?:{either})(?: and)?(?= [\w-]+ (?:{_goings()})\b)"
         yield kind, rf"{_BE}{_VERY}(?:{either})(?: and)?"
         yield "how", rf"(?:{either})(?= (?:{_GAITS})\b)"
-        yield "how", rf"(?<!\ba )(?<!\ban )(?<!\bthe )(?:{either})(?=$|[.,;!])"
+        yield "how", rf"(?<!\ba )(?<!\ban )(?<!\bthe )(?:{either})(?=$|[.,;:!])"
     else:
         yield kind, rf"(?:{either})s?"
 
@@ -91,10 +103,29 @@ def _people() -> str:
 
 
 @lru_cache(maxsize=1)
+def _goings() -> str:
+    """Return the words for "goes" of verbs of ways: what does so is a person, by any name."""
+    verbs = {
+        verb
+        for _, words in bearing_words()
+        for verbs, _ in map(_verbs_and_tail, words.get("gaits", ()))
+        for verb in verbs
+    }
+    return _longest_first(frozenset(third_person(verb) for verb in (verbs | {*_WAY_VERBS}) if verb.isalpha()))
+
+
+@lru_cache(maxsize=1)
 def doers() -> re.Pattern[str]:
     """Return the pattern of the people of whom words ask for a bearing that they do not ask for of others."""
     people = (entry.split(" : ", 1)[0] for _, words in bearing_words() for entry in words.get("by", ()))
     return re.compile(rf"\W*(?:(?:{ALL}) )?(?:{'|'.join(people)})\W*$")
+
+
+@lru_cache(maxsize=1)
+def named_by_adjectives() -> re.Pattern[str]:
+    """Return the pattern of a text that names a person by an adjective, and says no more: "a drunk sailor"."""
+    adjectives = "|".join(each for _, words in bearing_words() for each in words.get("adjectives", ()))
+    return re.compile(rf"\W*(?:(?:{ALL}) )?{_VERY}(?:(?:{adjectives}),? (?:and )?)+(?P<noun>[\w-]+)\W*$")
 
 
 @lru_cache(maxsize=1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -13,6 +13,8 @@ from marey.vocabulary.bearing_patterns import (
     SEEMS,
     bearing_patterns,
     doers,
+    named_by_adjectives,
+    only_beside,
     person_ahead,
     unless_beside,
     walking_forms,
@@ -20,13 +22,15 @@ from marey.vocabulary.bearing_patterns import (
 from marey.vocabulary.bearings import Side, StatedBearing, each_once
 from marey.vocabulary.counts import stated_strokes, strokes_before, strokes_behind
 from marey.vocabulary.held_poses import held_words
+from marey.vocabulary.hurt_legs import hurt_leg
 from marey.vocabulary.inflection import verb_forms
+from marey.vocabulary.lengths import verb_forms as verb_forms_known
 from marey.vocabulary.meanwhile import AT_ONCE, JOINS_AHEAD, WAYS, is_on_a_way, spans_at_once
 from marey.vocabulary.word_lists import load_word_lists
 
 KEPT_READINGS = 1024
 """Prompts whose words are kept as read: reader, scope and manifest ask for the same ones."""
-_LOAD, _PERSON = " with a load", "person"
+_LOAD, _PERSON, LIMP = " with a load", "person", "limp"
 _JOINT = re.compile(
     r"(?:^|(?<=\W))(?:(?:and|then|while|as|but|first|who|that|with)\s+)*(?:(?:he|she|they|it)\s+)?(?:(?:is|are)\s+)?$",
     re.IGNORECASE,
@@ -113,8 +117,6 @@ _ACTS = re.compile(
     r"$|[,.;!]| (?!bars?\b)(?:\w+(?:s|ing|ed|ly)|who|that|in|with|on|at|from|and|comes?|goes?|walk|run|stand)\b"
 )
 _SIDE = re.compile(r"\b(left|right)\b")
-_HEALTHY = re.compile(r"\bfavou?ring\b|\bgood\b")
-"""Words of the leg that does not hurt."""
 _WITH_HAND = re.compile(
     r",? (?:with|using) (?:(?:his|her|their|its|the|one's|my|your) )?(?:left|right) (?:hand|arm|fist|thumb)\b"
 )
@@ -171,6 +173,8 @@ _WAY = re.compile(rf"\b{WAYS}\b")
 _BORNE = rf"(?:{WAYS}|stand(?:s|ing)?|kneel(?:s|ing)?|crouch(?:es|ing)?|idles?|climb(?:s|ing)?|limp(?:s|ing)?)"
 _BORNE_BEFORE = re.compile(rf"\b{_BORNE}\b[^.;]*$")
 _BORNE_JUST_BEFORE = re.compile(rf"\b{_BORNE} (?:cycle )?$")
+_NAMED_AFTER = re.compile(r"[ -](?:walk|gait|run|jog|strut|walking|running)(?: cycle)?(?=\W|$)")
+"""A way that is named behind a verb: "swagger walk"."""
 _BORNE_AFTER = re.compile(rf"^\W*(?:\w+ly )?(?!\w+ing\b){_BORNE}\b")
 
 
@@ -308,6 +312,9 @@ def _without_joint(part: str) -> str:
 
 def _acts(text: str) -> bool:
     """Return True if something else is done in a text than bearing oneself in some way."""
+    named = named_by_adjectives().match(text.lower())
+    if named is not None and named["noun"] not in verb_forms_known():
+        return False
     return _says_more(BarePrompt.of(text.strip(" ,;.")).text)
 
 
@@ -372,7 +379,14 @@ def _found(prompt: str) -> tuple[_Words, ...]:
         apart = not spans or each.start >= spans[-1].end
         if (apart or _is_of_who(each, spans[-1])) and not _DENIED.search(text[: each.start]):
             spans.append(each)
-    return tuple(_of_zombies(spans))
+    return tuple(_of_limps(text, _of_zombies(spans)))
+
+
+def _of_limps(text: str, spans: Iterable[_Words]) -> Iterator[_Words]:
+    """Yield words, of limps with the leg that hurts, wherever the prompt names it."""
+    for each in spans:
+        limps = each.stated.bearing.gait == LIMP
+        yield replace(each, stated=replace(each.stated, side=hurt_leg(text))) if limps else each
 
 
 def _is_of_who(found: _Words, joined: _Words) -> bool:
@@ -381,9 +395,13 @@ def _is_of_who(found: _Words, joined: _Words) -> bool:
 
 
 def _of_zombies(spans: Sequence[_Words]) -> Iterator[_Words]:
-    """Yield words, of zombies with arms that are "out" ahead, not at the sides."""
+    """Yield words, of zombies with arms that are "out" ahead, not at the sides, and that lurch as the dead do, not as
+    drunkards."""
     ahead = any(each.stated.name == "zombie" for each in spans)
     for each in spans:
+        if ahead and each.stated.name == "drunk" and not each.stated.whole:
+            yield replace(each, stated=replace(each.stated, name="zombie"))
+            continue
         out = ahead and each.stated.name == "arms-wide" and each.stated.words.endswith(" out")
         yield replace(each, stated=replace(each.stated, name="arms-ahead")) if out else each
 
@@ -392,6 +410,8 @@ def _matches(text: str) -> Iterator[_Words]:
     for name, kind, pattern in bearing_patterns():
         for match in pattern.finditer(text):
             if name in unless_beside() and unless_beside()[name].search(text):
+                break
+            if name in only_beside() and not only_beside()[name].search(text):
                 break
             for each in _words_of(text, name, kind, match):
                 yield from _with_joints(text, _held(text, _counted(text, each)), only=kind == "meanwhile")
@@ -508,7 +528,8 @@ def _is_borne_otherwise(before: str, verb: str, after: str) -> bool:
     if verb.endswith("ing"):
         goes = _BORNE_BEFORE.search(before) and not _AND.search(before)
         return bool(goes or _BORNE_AFTER.match(after))
-    return not verb.endswith("s") and bool(_BORNE_JUST_BEFORE.search(before))
+    named = _BORNE_JUST_BEFORE.search(before) or _NAMED_AFTER.match(after)
+    return not verb.endswith(("s", "ed")) and bool(named)
 
 
 def _is_noun(before: str, verb: str) -> bool:
@@ -536,4 +557,4 @@ def _side(words: str) -> Side:
     side = _SIDE.search(words)
     if side is None:
         return ""
-    return "left" if (side[1] == "left") != bool(_HEALTHY.search(words)) else "right"
+    return "left" if side[1] == "left" else "right"

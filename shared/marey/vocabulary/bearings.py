@@ -76,6 +76,8 @@ WORDS = ("how", "by", "beside", "meanwhile", "gaits", "loads", "read", "adjectiv
 """Fields of a table of `bearings.toml` that hold words."""
 UNLESS = "unless"
 """Field that holds words of prompts that ask for no such bearing."""
+ONLY = "only"
+"""Field that holds words of which a prompt has to have one in order to ask for the bearing."""
 
 
 @dataclass(frozen=True)
@@ -153,6 +155,7 @@ class Bearing:
     swing: float = 1.0
     roll: float = 0.0
     roll_hz: float = 0.0
+    twists: float = 0.0
     heave: float = 0.0
     heave_hz: float = 0.0
     sob: float = 0.0
@@ -331,7 +334,7 @@ def _bearing(name: str, values: Mapping[str, Any]) -> Bearing:
     sides = {side: arms.get(side) or arms.get("both") for side in ("left", "right")}
     poses = {side: ArmPose(**_tuples(pose)) for side, pose in sides.items() if pose is not None}
     keys = Keys(**_tuples(values["keys"])) if "keys" in values else None
-    own = {key: value for key, value in values.items() if key not in ("arms", "keys", UNLESS, *WORDS)}
+    own = {key: value for key, value in values.items() if key not in ("arms", "keys", UNLESS, ONLY, *WORDS)}
     return Bearing(name, arms=poses, keys=keys, load="loads" in values, **_tuples(own))
 
 

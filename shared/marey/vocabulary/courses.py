@@ -6,6 +6,7 @@ import re
 from dataclasses import dataclass
 
 from marey.vocabulary.distances import stated_across
+from marey.vocabulary.hurt_legs import without_hurt_leg
 from marey.vocabulary.in_place import goes_in_place
 from marey.vocabulary.turns import WHOLE, Turn, stated_turn
 
@@ -62,6 +63,12 @@ _SHAPE = re.compile(
     r"(?:\ (?:counter-?|anti-?)?clockwise)?",
     re.VERBOSE | re.IGNORECASE,
 )
+_STAGGERS = re.compile(
+    r"\b(?:(?:stagger|stumbl|reel|wobbl|lurch|teeter|sway)(?:s|es|e|ing)?"
+    r"(?: (?:about|around)(?! (?:the|a|his|her|it)\b))?"
+    r"|drunk(?:en(?:ly)?|s)?|diz(?:zy|zily))\b"
+)
+"""Words of a body that weaves on its way, which is drawn on a straight one."""
 _DRIBBLES = re.compile(r"\bdribbl\w+\b")
 _AHEAD = re.compile(
     r"\b(?:walk|jog|run|runn|mov|advanc|dash|charg|sprint|stroll)(?:s|es|e|ing)?\b|\b(?:forwards?|ahead)\b"
@@ -98,7 +105,7 @@ def stated_course(prompt: str, action: str) -> WayCourse | None:
     """
     if goes_in_place(prompt, action):
         return None
-    text = " ".join(prompt.lower().replace("’", "'").split())
+    text = without_hurt_leg(" ".join(prompt.lower().replace("’", "'").split()))
     sides = set(re.findall(r"\b(left|right)(?:wards?)?\b", text))
     side = next(iter(sides)) if len(sides) == 1 else ""
     turn = stated_turn(text, action)
@@ -121,7 +128,9 @@ def stated_course(prompt: str, action: str) -> WayCourse | None:
         return WayCourse(ASIDE, aside["side"].lower())
     if action in WAYS and _ZIGZAG.search(text):
         return WayCourse(ZIGZAG, side)
-    return WayCourse() if action in WAYS and turn == Turn() else None
+    if action not in WAYS:
+        return None
+    return WayCourse() if Turn() in (turn, stated_turn(_STAGGERS.sub(" ", text), action)) else None
 
 
 def without_course(prompt: str, action: str) -> str:

@@ -79,6 +79,11 @@ WHOLE = re.compile(
 """The length of the whole at the end of a prompt: "keep it to 3 seconds", "length: 4 s", "6 seconds in total"."""
 UNDER = 0.9
 """Share of a length that a motion stays under."""
+_BY_LENGTH = re.compile(
+    r"(?:,|-|–|—)?\s*\b(?:for|lasting|over|during|in)\s+(?:(?:about|around|exactly|roughly|only|just|some|maybe|approximately)\s+)*$"
+    r"|,?\s*\b(?:about|around|exactly|roughly|approximately|lasting)\s+$|[\s,(~]+$"
+)
+"""Words that join a length to the clause before it."""
 _LABEL = re.compile(r"\b(?:length|duration|total|time|lasting|takes?|overall)\b")
 
 
@@ -118,6 +123,31 @@ def stated_length(prompt: str) -> StatedLength:
     if len(found) < len(parts):
         return StatedLength(is_partial=True)
     return StatedLength(sum(map(_seconds, found)))
+
+
+def only_length(prompt: str) -> float | None:
+    """Return the seconds of the one length that a prompt of one movement names, wherever it stands; None = it names
+    none, or several: "sprint start, then full speed, 3 seconds" has three."""
+    text = " ".join(without_held_pose(prompt).lower().split())
+    found = [match for match in _LENGTH.finditer(text) if not _is_moment(text, match)]
+    return _seconds(found[0]) if len(found) == 1 else None
+
+
+def without_length(prompt: str) -> str:
+    """Return a prompt without its lengths: "walk away" of "walk away for 4 seconds"; as it is where nothing is left.
+
+    Models are told how long a motion is, and make other movements of such words.
+    """
+    kept, text = prompt, prompt.lower()
+    for found in reversed(list(_LENGTH.finditer(text) if len(text) == len(prompt) else ())):
+        if _is_moment(text, found):
+            continue
+        joint = _BY_LENGTH.search(text[: found.start()])
+        begin = found.start() if joint is None else joint.start()
+        behind = kept[found.end() :].removeprefix(")").removeprefix(" of")
+        kept = f"{kept[:begin]}{behind}" if begin else behind.lstrip(" ,;:-–—")
+    kept = kept.strip(" ,;:-–—")
+    return kept if re.search(r"[^\W\d_]{2}", kept) else prompt
 
 
 def _listed(part: str) -> Iterator[str]:

@@ -410,6 +410,26 @@ def test_who_staggers_leaves_the_straight_way_and_comes_back_to_it() -> None:
     assert np.ptp(np.degrees(course_of(LAYOUT.encode(joints), LAYOUT).headings)) < 5
 
 
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seconds", [2.6, 4.0])
+def test_a_short_stagger_ends_on_the_way_on_which_it_began(seconds: float, seed: int) -> None:
+    joints = LAYOUT.decode(LAYOUT.encode(walker(seconds + 2.0))).astype(np.float64)
+    after = staggering(joints, LAYOUT, 0, round(seconds * FPS), "", np.random.default_rng(seed))
+    way = after[-1, PELVIS] - after[0, PELVIS]
+    assert abs(np.degrees(np.arctan2(way[0], way[2]))) < 14
+    ends = course_of(LAYOUT.encode(after), LAYOUT)
+    assert abs(np.degrees(ends.headings[-1] - ends.headings[0])) < 12
+
+
+def test_who_swaggers_turns_the_shoulders_with_the_steps() -> None:
+    def yaw(joints: np.ndarray) -> np.ndarray:
+        across = joints[:, SHOULDERS[0]] - joints[:, SHOULDERS[1]]
+        return np.degrees(np.arctan2(across[:, 2], across[:, 0]))
+
+    before, after = yaw(drawn(walker())), yaw(drawn(walker(), named("swagger")))
+    assert np.ptp(after[20:-20]) > np.ptp(before[20:-20]) + 12
+
+
 def test_the_manifest_says_what_is_drawn() -> None:
     spans = [BorneSpan(0, 40, (named("limp", "left"), named("old")), "walk", 3)]
     record = [{"name": "limp", "side": "left"}, {"name": "old"}]

@@ -40,11 +40,15 @@ def test_more_frames_are_asked_for_of_runs_alone() -> None:
     assert frames_to_begin("run", 60, LIMITS) == 60 + round(20 * LEAD_S)
     assert frames_to_begin("run", 190, LIMITS) == 196
     assert frames_to_begin("walk", 60, LIMITS) == 60
+    assert frames_to_begin("walk", 30, LIMITS) == 48, "shorter walks are made in a crouch"
+    assert frames_to_begin("sneak", 30, LIMITS) == 30
 
 
 def test_what_a_run_stands_before_is_left_out() -> None:
     assert 15 <= begun(late_run(1.2), LAYOUT, "run") <= 25
     assert begun(late_run(0.0), LAYOUT, "run") == 0
+    at_once, from_rest = (begun(late_run(1.2), LAYOUT, "sprint", said) for said in ("sprint", "sprint start"))
+    assert at_once - from_rest >= 8
     assert begun(late_run(1.2), LAYOUT, "walk") == 0
     assert begun(LAYOUT.encode(Body(3.0).joints()), LAYOUT, "run") == 0
 

@@ -7,9 +7,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from marey.generation.shots.going_on import LEAST_S, MOST_S, WAITS_S, is_way, without_halt, without_wait
+from marey.generation.shots.going_on import (
+    LEAST_S,
+    MOST_S,
+    WAITS_S,
+    as_long_as_stated,
+    aside_of,
+    is_way,
+    keeps_course,
+    without_halt,
+    without_wait,
+)
 from marey.generation.shots.windows import no_text
 from marey.motion.features import HUMANML3D_263
+from marey.text.features import TextFeatures
 from tests.support.bodies import Body, steady
 
 LAYOUT = HUMANML3D_263
@@ -59,3 +70,25 @@ def test_a_way_begins_at_once() -> None:
     assert len(late) / LAYOUT.fps == pytest.approx(5.0 - 1.5 + WAITS_S, abs=0.3)
     at_once = way(-1.0, 9.0)
     assert len(without_wait(at_once, LAYOUT)) == len(at_once)
+
+
+def test_a_way_keeps_the_seconds_that_are_stated() -> None:
+    walk = LAYOUT.encode(Body(4.0, speed=steady(1.2)).joints())
+    made_up = as_long_as_stated(walk[:50], LAYOUT, 70)
+    assert len(made_up) == 70
+    place = LAYOUT.decode(made_up)[:, 0, 2]
+    assert place[-1] - place[50] == pytest.approx(1.2, abs=0.3)
+    assert as_long_as_stated(walk, LAYOUT, 60) is walk
+
+
+def test_ways_behind_other_movements_keep_their_course() -> None:
+    def text(said: str, words: str) -> TextFeatures:
+        return replace(no_text(4), prompt=said, rewritten=words)
+
+    duck, walk = text("ducks", "a person dodges left"), "a person walks forward"
+    assert aside_of(text("walks to the left", walk)) == 90
+    assert aside_of(text("walks to the right", walk)) == -90
+    assert aside_of(text("walks away", walk)) == 0
+    assert keeps_course(duck, text("walks away", walk))
+    assert not keeps_course(duck, text("walks in a circle", walk))
+    assert not keeps_course(text("walks", walk), text("walks away", walk)), "they are joined as one way"

@@ -50,7 +50,8 @@ def test_arms_swing_against_the_legs() -> None:
 def test_knees_are_raised_where_the_words_say_so() -> None:
     high, plain = (marched(prompt)[:, KNEES, 1].max() for prompt in ("marches with high knees", "marches ahead"))
     assert high > 0.68
-    assert plain < 0.6
+    assert 0.57 < plain < 0.66, "each knee is lifted, but not high"
+    assert np.median(marched("marches ahead")[:, 0, 1]) > 0.86, "upright"
 
 
 def test_a_march_fills_the_seconds_that_are_stated() -> None:

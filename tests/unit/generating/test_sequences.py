@@ -106,6 +106,20 @@ def test_rows_share_the_length_that_is_asked_for(generator: Any) -> None:
     assert np.ptp(ratios) < 0.1
 
 
+def test_movements_without_a_length_take_none_of_those_that_others_state(generator: Any) -> None:
+    width, fps = generator.limits.text_width, generator.limits.fps
+    parts = ("walks for 2 seconds", "runs for 3 seconds", "bows")
+    text = replace(text_of(", ".join(parts), width), movements=tuple(text_of(part, width) for part in parts))
+    rows = alone(generator, resolve_request(generator, Request(text, 3, frames=round(5 * fps))))
+    assert rows[:2] == [round(2 * fps), round(3 * fps)]
+
+
+def test_one_movement_is_as_long_as_the_only_length_that_its_words_name(generator: Any) -> None:
+    text = text_of("sprint start then full speed, 3 seconds", generator.limits.text_width)
+    request = resolve_request(generator, Request(text, 3))
+    assert (request.frames, request.open) == (round(3 * generator.limits.fps), False)
+
+
 def test_what_is_too_short_for_its_movements_stays_one_text(generator: Any) -> None:
     request = resolve_request(generator, Request(prompt_of(generator), 3, frames=40))
     assert (request.timeline, request.frames) == (None, 40)
@@ -342,3 +356,19 @@ def test_turns_between_movements_lose_nothing_to_transitions(
     assert abs(degrees) == pytest.approx(180, abs=4)
     if before[0] == "wave":
         assert heading_change(made.features, drawing.layout) == pytest.approx(degrees, abs=8)
+
+
+@pytest.mark.parametrize(("way", "degrees"), [("walks to the left", 90.0), ("walks away", 0.0)])
+def test_ways_behind_other_movements_go_where_they_are_said_to(
+    drawing: Any, monkeypatch: pytest.MonkeyPatch, way: str, degrees: float
+) -> None:
+    asked = list[float]()
+
+    def whole(features: Any, layout: Any, turns: Any) -> Any:
+        asked.extend(turn.degrees for turn in turns)
+        return with_whole_turns(features, layout, turns)
+
+    monkeypatch.setattr(timelines, "with_whole_turns", whole)
+    said = ("wave", "waves"), ("walk", way)
+    generate_any(drawing, [resolve_request(drawing, Request(sequence_of(drawing, *said), 3))])
+    assert asked == [degrees]

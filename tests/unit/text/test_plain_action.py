@@ -33,6 +33,10 @@ def plain_pipeline(pipeline: TextPipeline, **more: bool) -> TextPipeline:
     [
         ("The waiter takes a bow.", "bow", "a person bows, the waiter takes a bow."),
         ("jog", "run", "a person runs, jog"),
+        ("a drunk staggers home across the alley", "walk", "a person walks forward"),
+        ("swagger walk, cocky gangster attitude", "walk", "a person walks forward"),
+        ("walk away for 4 seconds", "walk", "a person walks forward, walk away"),
+        ("back-pedals at a jog", "walk-backward", "a person walks backward"),
         ("NPC kicks twice", "kick", "a person kicks, NPC kicks twice"),
         ("A goblin hunkers low", "crouch", "a person crouches, a goblin hunkers low"),
         ("I bow", "bow", "a person bows, I bow"),

@@ -2,7 +2,7 @@
 
 import pytest
 
-from marey.vocabulary.lengths import StatedLength, stated_length
+from marey.vocabulary.lengths import StatedLength, only_length, stated_length, without_length
 from marey.vocabulary.report import ScopeReport
 from marey.vocabulary.scope import ActionLists, match_scope
 
@@ -101,3 +101,26 @@ def test_the_length_of_a_first_clause_is_that_of_a_part() -> None:
     assert stated_length("After clapping for two seconds, the clown bows.") == StatedLength(is_partial=True)
     assert stated_length("After a bow, he claps for two seconds, then kneels").is_partial
     assert stated_length("after two seconds, he claps") == StatedLength()
+
+
+@pytest.mark.parametrize(
+    ("prompt", "left"),
+    [
+        ("walk away for 4 seconds", "walk away"),
+        ("limp forward, wounded left leg, 5 seconds", "limp forward, wounded left leg"),
+        ("jogs back, about 4 seconds", "jogs back"),
+        ("2s of waving", "waving"),
+        ("For 2.5 seconds she waves", "she waves"),
+        ("he walks (5 s)", "he walks"),
+        ("3 seconds", "3 seconds"),
+        ("waits, and two seconds later he falls", "waits, and two seconds later he falls"),
+    ],
+)
+def test_models_read_no_lengths(prompt: str, left: str) -> None:
+    assert without_length(prompt) == left
+
+
+def test_the_only_length_of_one_movement_is_its_own() -> None:
+    assert only_length("sprint start then full speed, 3 seconds") == 3.0
+    assert only_length("walks for 2 seconds, then runs for 3 seconds") is None
+    assert only_length("walks home") is None

@@ -17,7 +17,7 @@ Array = NDArray[np.floating]
 
 
 @dataclass(frozen=True)
-class _Form:
+class GaitForm:
     """How a gait is done in place.
 
     Attributes:
@@ -48,11 +48,11 @@ class _Form:
 
 
 FORMS = {
-    "walk": _Form(0.55, 0.84, 40, 16, 14, 0.008, 0.008, 0.03, 2, 18, 17, 1, 3),
-    "march": _Form(0.54, 0.86, 76, 4, 18, 0.006, 0.006, 0.028, 2, 26, 30, -1, 3),
-    "jog": _Form(0.37, 1.14, 42, 56, 22, 0.03, 0.035, 0.018, -12, 88, 24, 4, 5),
-    "run": _Form(0.32, 1.2, 56, 60, 24, 0.035, 0.035, 0.014, -10, 92, 34, 6, 6),
-    "sprint": _Form(0.27, 1.22, 66, 62, 24, 0.04, 0.035, 0.012, -8, 92, 42, 8, 7),
+    "walk": GaitForm(0.55, 0.84, 40, 16, 14, 0.008, 0.008, 0.03, 2, 18, 17, 1, 3),
+    "march": GaitForm(0.54, 0.86, 76, 4, 18, 0.006, 0.006, 0.028, 2, 26, 30, -1, 3),
+    "jog": GaitForm(0.37, 1.14, 42, 56, 22, 0.03, 0.035, 0.018, -12, 88, 24, 4, 5),
+    "run": GaitForm(0.32, 1.2, 56, 60, 24, 0.035, 0.035, 0.014, -10, 92, 34, 6, 6),
+    "sprint": GaitForm(0.27, 1.22, 66, 62, 24, 0.04, 0.035, 0.012, -8, 92, 42, 8, 7),
 }
 """Gaits by name."""
 TEMPOS = {"slow": (1.2, 1.3), "": (0.96, 1.05), "fast": (0.84, 0.9)}
@@ -101,7 +101,7 @@ def gait_in_place(
         for side in SIDES:
             share = lifts[side] * (0.55 + 0.45 * size)
             _lift_leg(body, side, form, share)
-            _swing_arm(body, side, form, size, _phase(time, OTHER_SIDE[side], first))
+            swing_running_arm(body, side, form, size, _phase(time, OTHER_SIDE[side], first))
 
     return Gesture(seconds, (f"{gait}-in-place",), change, times=steps, fills=True)
 
@@ -127,7 +127,7 @@ def _phase(time: Array, side: str, first: str) -> Array:
     return (1.0 if side == first else -1.0) * np.sin(np.pi * np.clip(time, 0.0, None))
 
 
-def _move_trunk(body: StandingBody, form: _Form, time: Array, size: Array, first: str) -> None:
+def _move_trunk(body: StandingBody, form: GaitForm, time: Array, size: Array, first: str) -> None:
     """Lower, sway, lean and twist the trunk."""
     phase = _phase(time, first, first)
     middle = np.sin(np.pi * (time - 0.5 * (form.air - 1.0))) ** 2  # highest in the middle of a step
@@ -140,7 +140,7 @@ def _move_trunk(body: StandingBody, form: _Form, time: Array, size: Array, first
     body.lean(SIGN[first] * form.twists * size * phase, "up")
 
 
-def _lift_leg(body: StandingBody, side: str, form: _Form, share: Array) -> None:
+def _lift_leg(body: StandingBody, side: str, form: GaitForm, share: Array) -> None:
     """Lift a foot: first off the floor, then to its place."""
     hip, knee, ankle, toe = LEGS[side]
     thigh, shank, hangs = (np.radians(each) for each in (form.thigh, form.shank, form.toes))
@@ -160,7 +160,7 @@ def _lift_leg(body: StandingBody, side: str, form: _Form, share: Array) -> None:
     body.joints[:, toe] = body.joints[:, ankle] + body.world(hung, side)
 
 
-def _swing_arm(body: StandingBody, side: str, form: _Form, size: Array, phase: Array) -> None:
+def swing_running_arm(body: StandingBody, side: str, form: GaitForm, size: Array, phase: Array) -> None:
     """Swing an arm with the foot of the other side."""
     upper = np.radians(form.upper + form.swings * phase)
     fore = upper + np.radians(form.elbow + 0.25 * form.swings * phase)

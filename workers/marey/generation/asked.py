@@ -29,6 +29,7 @@ from marey.generation.port import GenerationControl, Generator, MotionFeatures, 
 from marey.generation.pose_holds import HOLDING, with_held_pose
 from marey.generation.postured import GOING_ON, drawn_posture, gone_on, on_posture
 from marey.generation.repetitions import repeated
+from marey.generation.skidding import skidded, skids
 from marey.generation.stated import AT_PACE
 from marey.generation.steered import steered_features
 from marey.generation.stepped import stepped
@@ -79,6 +80,7 @@ class AskedMotion:
             its end came after the action; `footed`, true where a run was held back by the slide of its
             feet; `begun`, how many seconds of its beginning were left out, in which a run stood; `posture`, in which a
             gesture is done (`marey.generation.postured`), or `as before`, that in which the movement before has ended;
+            `skids`, `skid` or `stop`, with which a run ends (`marey.generation.skidding`);
             `pose_held`, seconds for which the words have its pose held.
     """
 
@@ -196,7 +198,7 @@ def _as_asked(
     if source is None:
         return None
     layout, features = generator.layout, source.features
-    late = 0 if whole is not None or wish.count is not None else begun(features, layout, wish.action)
+    late = 0 if whole is not None or wish.count is not None else begun(features, layout, wish.action, request.text.said)
     changes: dict[str, Any] = {GAZE: list(wish.gaze)} if wish.gaze and request.drawing else {}
     if not request.held.is_drawn and _is_mirrored(features, layout, wish, request.seed, drawn=whole is not None):
         features, changes["mirrored"] = layout.mirror(features), True
@@ -221,6 +223,7 @@ def _as_asked(
         features = far
     elif whole is None or not whole.exact or wish.action not in AT_PACE:
         features = _retimed(features, layout, wish, fixed, changes, whole)
+    features = _skidded(features, layout, wish, request, changes) if whole is None else features
     held = held_pose(request.text.said) if whole is not None and fixed is None and wish.action in HOLDING else None
     if held is not None and len(features) >= SHORTEST:
         features, changes["pose_held"] = with_held_pose(features, layout, held), held
@@ -366,9 +369,19 @@ def _retimed(
     if frames != len(features) and ("repetitions" in changes or speed != 1.0 or wish.pace.share != 1.0):
         changes["speed"] = round(len(features) / frames, 3)
         features = pace_features(features, layout.slices, frames)
-    if wish.pace.of_way and "speed" in changes:
+    if wish.pace.of_way:
         return features[:fixed]  # a way may end at any step
     return features
+
+
+def _skidded(
+    features: Float32, layout: FeatureLayout, wish: Wish, request: Request, changes: dict[str, Any]
+) -> Float32:
+    """Return the motion of a run with the skid in which its prompt has it end."""
+    how = skids(request.text.said, wish.action) if request.drawing and layout.skeleton.name == HUMANML3D.name else ""
+    ends = skidded(features, layout, how, wish.seed, None if request.open else request.frames) if how else None
+    changes.update({} if ends is None else {"skids": how})
+    return features if ends is None else ends
 
 
 def _as_far(

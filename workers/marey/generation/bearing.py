@@ -408,6 +408,8 @@ class _Drawing:
         if bearing.roll:
             aside = self._swung(bearing.roll_hz) if bearing.roll_hz else self._steps()
             body.lean(bearing.roll * legs * aside, "forward")
+        if bearing.twists:
+            body.lean(bearing.twists * legs * self._steps(), "up")
         if bearing.head or keys.head:
             body.turn(NECK, "left", (bearing.head + self._keyed(keys.head)) * way)
         if bearing.tilt:

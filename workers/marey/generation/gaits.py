@@ -28,12 +28,14 @@ Array = NDArray[np.floating]
 ANKLES = {LEFT: 7, RIGHT: 8}
 STEP = 0.015
 """Metres a frame by which a standing foot falls behind the other in a walk, at least."""
-HURRIES, LINGERS = 0.55, 0.22
+HURRIES, LINGERS = 0.75, 0.28
 """By how much the time of a limp runs faster over the leg that hurts, and slower over the other."""
 DIP, ASIDE, AHEAD = 0.045, 9.0, 7.0
 """Metres by which the hips sink over the leg that hurts, and degrees by which the trunk leans to it, and forward."""
 WEAVES, WEAVES_HZ = 46.0, (0.2, 0.28)
 """Degrees by which a staggering body leaves its way to each side, and how often a second."""
+WEAVES_EASES_S = 0.8
+"""Seconds in which it leaves its way, and comes back to it."""
 WEAVES_AT = 0.4
 """Metres a second from which on it does so in full: who stands would slide on the feet."""
 UNEVEN, UNEVEN_HZ = 0.5, 0.5
@@ -115,12 +117,11 @@ def staggering(
     inside, time = _inside(len(joints), begin, end, layout.fps), np.arange(len(joints)) / layout.fps
     hz, phase = rng.uniform(*WEAVES_HZ), rng.uniform(0, 2 * np.pi)
     natural = natural_course(joints, layout.skeleton, layout.fps)
-    weaves = (
-        np.radians(WEAVES)
-        * inside
-        * np.clip(_speed(joints, layout.fps) / WEAVES_AT, 0.0, 1.0)
-        * np.sin(2 * np.pi * hz * time + phase)
-    )
+    edges = np.minimum(time - begin / layout.fps, (end - 1) / layout.fps - time)
+    way = eased(edges / WEAVES_EASES_S) * np.clip(_speed(joints, layout.fps) / WEAVES_AT, 0.0, 1.0)
+    swings = np.sin(2 * np.pi * max(hz, layout.fps / (end - begin)) * time + phase)
+    swings -= np.sum(way * swings) / max(np.sum(way), 1e-9)  # it comes to the side on which it would walk straight
+    weaves = np.radians(WEAVES) * way * swings
     woven = bent_along(joints, layout, natural, natural.facing(natural.headings + weaves))
     body = StandingBody(woven)
     lurch = inside * _lurches(time, rng)

@@ -32,6 +32,7 @@ from marey.generation.kicking import ball_kick_asked_for, kick_asked_for
 from marey.generation.kneeling import drops_asked_for
 from marey.generation.named import named_movement
 from marey.generation.raising import stated_raise
+from marey.generation.running_back import run_back_asked_for
 from marey.generation.stairs import stairs_asked_for
 from marey.generation.stepping_aside import diagonal_asked_for, steps_aside
 from marey.generation.stepping_in_place import gait_asked_for_in_place
@@ -135,7 +136,9 @@ STATED: Mapping[str, Statement] = {
     "run": partial(gait_asked_for_in_place, "run"),
     "sprint": partial(gait_asked_for_in_place, "sprint"),
     "walk-backward": lambda wish, rng, seconds: (
-        diagonal_asked_for(wish, rng, seconds) or strides_asked_for(wish, rng, seconds, back=True)
+        diagonal_asked_for(wish, rng, seconds)
+        or run_back_asked_for(wish, rng, seconds)
+        or strides_asked_for(wish, rng, seconds, back=True)
     ),
     **dict.fromkeys(("pick-up", "reach-forward"), stated_load),
     **dict.fromkeys(("dodge", "jump", "jump-forward"), jumps_away),

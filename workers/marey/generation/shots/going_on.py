@@ -9,11 +9,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from marey.generation.onward import gone_on_with_strides
+from marey.generation.skidding import skids
+from marey.generation.wish import action_of
 from marey.motion.courses import course_of
 from marey.motion.features import FeatureLayout
 from marey.motion.rotations import Array
 from marey.selector.matching import WAYS, wanted_of
 from marey.text.features import TextFeatures
+from marey.vocabulary.courses import ASIDE, QUARTER, STRAIGHT, stated_course
+from marey.vocabulary.gazes import without_gaze
 from marey.vocabulary.in_place import goes_in_place
 
 Float32 = NDArray[np.float32]
@@ -30,7 +35,7 @@ WAITS_S = 0.4
 
 def is_way(text: TextFeatures) -> bool:
     """Return True if a text asks for a walk, a run or a leap ahead, and for nothing else."""
-    if goes_in_place(text.said, "walk"):
+    if goes_in_place(text.said, "walk") or skids(text.said, action_of(text)):
         return False
     steps = wanted_of(text.actions or (text.rewritten,)) or ()
     return len(steps) == 1 and {each.action for each in steps[0]} <= GOES_ON
@@ -40,6 +45,29 @@ def without_halt(before: Float32, after: Float32, layout: FeatureLayout) -> tupl
     """Return features (T, D) of two ways without the slow end of the first and the slow beginning of the second."""
     ends, begins = (course_of(features, layout).speeds(layout.fps) for features in (before, after))
     return before[: len(before) - _slow(ends[::-1], layout.fps)], after[_slow(begins, layout.fps) :]
+
+
+def as_long_as_stated(features: Float32, layout: FeatureLayout, frames: int) -> Float32:
+    """Return features (T, D) of a way whose seconds the words state: what was left out beside other ways is made up for
+    with strides of its own."""
+    if len(features) >= frames:
+        return features
+    longer = gone_on_with_strides(features, layout, frames)
+    return features if longer is None else longer
+
+
+def aside_of(text: TextFeatures) -> float:
+    """Return the degrees by which a way goes off to a side, positive to the left; 0 if it does not."""
+    course = stated_course(without_gaze(text.said), action_of(text))
+    if course is None or course.kind != ASIDE:
+        return 0.0
+    return QUARTER if course.side == "left" else -QUARTER
+
+
+def keeps_course(before: TextFeatures, text: TextFeatures) -> bool:
+    """Return True if a text asks for a way straight on from where the body faces before it, or off to a side."""
+    course = stated_course(without_gaze(text.said), action_of(text))
+    return is_way(text) and course is not None and course.kind in (STRAIGHT, ASIDE) and not is_way(before)
 
 
 def without_wait(features: Float32, layout: FeatureLayout) -> Float32:

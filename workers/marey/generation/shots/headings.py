@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.generation.turned import bent_along
-from marey.motion.courses import Course, natural_course
+from marey.motion.courses import Course, carried, natural_course
 from marey.motion.features import FeatureLayout, encode_all
 from marey.motion.filters import smoothstep
 from marey.motion.kinematics import facing
@@ -41,6 +41,7 @@ class JoinedTurn:
         begin, end: frames of the turn and of both its transitions.
         degrees: by which it turns, positive to the left.
         follows: what comes after it goes straight on.
+        runs: it is part of a run, whose feet hardly stand: they are turned with the body.
     """
 
     before: int
@@ -48,6 +49,7 @@ class JoinedTurn:
     end: int
     degrees: float
     follows: bool = False
+    runs: bool = False
 
 
 def heading_change(features: Float32, layout: FeatureLayout) -> float:
@@ -67,20 +69,34 @@ def with_whole_turns(features: Float32, layout: FeatureLayout, turns: Sequence[J
         turns: those of the sequence, in their order.
     """
     joints, fps = layout.decode(features).astype(np.float64), layout.fps
-    natural = natural_course(joints, layout.skeleton, fps)
-    added = np.zeros(len(joints))
-    for turn in turns:
-        comes = _direction(natural, max(turn.before - round(LOOKS_S * fps), 0), turn.before) if turn.before else None
-        ahead = round((AHEAD_S if turn.follows else LOOKS_S) * fps)
-        goes = _direction(natural, turn.end, min(turn.end + ahead, len(joints)))
-        first = natural.headings[0] if comes is None else comes
-        last = natural.headings[-1] if goes is None else goes
-        missing = np.radians(turn.degrees) - (last - first)
-        if np.radians(NEAR) < abs(missing) < np.radians(MOST):
-            added += missing * _share(natural.headings, turn.begin, turn.end)
-    if not added.any():
-        return features
-    return encode_all(layout, bent_along(joints, layout, natural, natural.facing(natural.headings + added)))
+    for runs in (False, True):
+        natural = natural_course(joints, layout.skeleton, fps)
+        added = np.zeros(len(joints))
+        for turn in turns:
+            if turn.runs == runs:
+                added += _missing(natural, turn, fps)
+        wanted = natural.facing(natural.headings + added)
+        if not added.any():
+            continue
+        if runs:
+            joints = carried(joints, natural, wanted, np.arange(len(joints), dtype=np.float64))
+        else:
+            joints = bent_along(joints, layout, natural, wanted)
+        features = encode_all(layout, joints)
+    return features
+
+
+def _missing(natural: Course, turn: JoinedTurn, fps: float) -> Array:
+    """Return the radians (T,) that are missing to a turn, as they are added to it; 0 where too many are."""
+    comes = _direction(natural, max(turn.before - round(LOOKS_S * fps), 0), turn.before) if turn.before else None
+    ahead = round((AHEAD_S if turn.follows else LOOKS_S) * fps)
+    goes = _direction(natural, turn.end, min(turn.end + ahead, len(natural.headings)))
+    first = natural.headings[0] if comes is None else comes
+    last = natural.headings[-1] if goes is None else goes
+    missing = np.radians(turn.degrees) - (last - first)
+    if not np.radians(NEAR) < abs(missing) < np.radians(MOST):
+        return np.zeros(len(natural.headings))
+    return missing * _share(natural.headings, turn.begin, turn.end)
 
 
 def _direction(course: Course, begin: int, end: int) -> float | None:
@@ -100,6 +116,7 @@ def _share(headings: Array, begin: int, end: int) -> Array:
     last = min(end, len(headings) - 1)
     passed = np.abs(np.diff(headings, prepend=headings[:1]))
     passed[: begin + 1], passed[last + 1 :] = 0.0, 0.0
-    turned = np.cumsum(passed) / max(float(passed.sum()), 1e-9)
     even = smoothstep(np.clip((np.arange(len(headings)) - begin) / max(last - begin, 1), 0.0, 1.0))
-    return 0.7 * turned + 0.3 * even
+    if passed.sum() < 1e-6:
+        return even
+    return 0.7 * np.cumsum(passed) / float(passed.sum()) + 0.3 * even

@@ -27,7 +27,7 @@ from marey.items.timeline import MIN_ROW_SECONDS
 from marey.text.features import TextFeatures
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.gazes import stated_gaze
-from marey.vocabulary.lengths import stated_length
+from marey.vocabulary.lengths import only_length, stated_length
 from marey.vocabulary.scope import STANDING
 
 SEED = "movement"
@@ -84,12 +84,16 @@ def as_timeline(generator: Generator[Any], request: Request) -> Request:
     movements = _until_death(_merged_falls(request.text), request.text.said.lower())
     movements = _leaping(movements) if draws(generator, request) else movements
     alone = not (request.kept or request.free or request.recording or request.timeline)
+    if not movements and alone and request.frames is None:
+        request = replace(request, frames=_only_frames(generator.limits, request.text.said))
     if not (movements and alone and generator.limits.keeps):
         return request
     generator.limits.check(request)
     fps = generator.limits.fps
     if len(movements) == 1:
         return replace(request, text=replace(movements[0], prompt=request.text.prompt))
+    if _is_sum_of_parts(request, movements, fps):
+        request = replace(request, frames=None)
     stated = [_stated_frames(generator.limits, request, movement) for movement in movements]
     lengths = [
         own or _drawn_frames(generator, request, movement, number)
@@ -111,6 +115,22 @@ def as_timeline(generator: Generator[Any], request: Request) -> Request:
         for end, length, text, own, held in zip(ends, lengths, movements, stated, postures, strict=True)
     )
     return replace(request, timeline=rows)
+
+
+def _only_frames(limits: Limits, said: str) -> int | None:
+    """Return the frames of a prompt of one movement that names one length; None = it names none within the range of the
+    bundle."""
+    seconds = only_length(said)
+    frames = None if seconds is None else round(seconds * limits.fps)
+    return frames if frames is not None and limits.min_frames <= frames <= limits.max_frames else None
+
+
+def _is_sum_of_parts(request: Request, movements: Sequence[TextFeatures], fps: float) -> bool:
+    """Return True if the frames of a request are the sum of the lengths that the words of some movements state, and
+    others have none: these need time of their own."""
+    said = [stated_length(movement.prompt).seconds for movement in movements]
+    known = [each for each in said if each is not None]
+    return len(known) < len(said) and len(known) > 0 and request.frames == round(sum(known) * fps)
 
 
 def _stated_frames(limits: Limits, request: Request, movement: TextFeatures) -> int | None:

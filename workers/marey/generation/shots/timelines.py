@@ -27,7 +27,14 @@ from marey.generation.port import GenerationControl, Generator, Limits, NoContro
 from marey.generation.postured import MEETS, pass_into
 from marey.generation.shots.flowing import BENT_ON, flowing, flowing_as_shown, without_rest
 from marey.generation.shots.freezing import AS_BEFORE, freezes, frozen
-from marey.generation.shots.going_on import is_way, without_halt, without_wait
+from marey.generation.shots.going_on import (
+    as_long_as_stated,
+    aside_of,
+    is_way,
+    keeps_course,
+    without_halt,
+    without_wait,
+)
 from marey.generation.shots.headings import JoinedTurn, heading_change, with_whole_turns
 from marey.generation.shots.levels import raised_rows
 from marey.generation.shots.lifted_steps import with_steps
@@ -36,6 +43,7 @@ from marey.generation.shots.strands import Fate, RowStrand, Strand, Transition
 from marey.generation.shots.timeline_plan import even_parts, plan_timeline
 from marey.generation.shots.way_lengths import as_long_as, metres_between, ways_back
 from marey.generation.shots.windows import CONTEXT, Float32, Window, fill, most_frames
+from marey.generation.steered import SETS_OFF_S
 from marey.generation.timed import TimedText
 from marey.generation.wish import action_of
 from marey.items.timeline import TIMELINE_HINT, no_timelines
@@ -166,6 +174,9 @@ class _Timeline:
                 and is_way(after.text)
             ):
                 before.features, after.features = without_halt(before.features, after.features, layout)
+        for row in self.rows:
+            if row.features is not None and not row.open and is_way(row.text):
+                row.features = as_long_as_stated(row.features, layout, row.part.frames)
         if layout.skeleton.name == HUMANML3D.name:
             self._lead_back(layout)
             self._keep_guard(layout)
@@ -310,13 +321,26 @@ class _Timeline:
         """Return the turns between movements that are joined."""
         found = list[JoinedTurn]()
         for number, row in enumerate(self.rows):
+            before, after = self._row(number - 1), self._row(number + 1)
             if row.turn:
-                before, after = self._row(number - 1), self._row(number + 1)
                 begin = row.part.start if before is None else before.part.end
-                end = row.part.end if after is None else self._joined_at(number + 1)
                 follows = after is not None and is_way(after.text)
-                found.append(JoinedTurn(0 if before is None else before.part.end, begin, end, row.turn, follows))
+                aside = aside_of(after.text) if after is not None and follows else 0.0
+                end = row.part.end if after is None else self._joined_at(number + 1)
+                end += self._sets_off(aside)
+                found.append(
+                    JoinedTurn(0 if before is None else before.part.end, begin, end, row.turn + aside, follows)
+                )
+            elif before is not None and not before.turn and keeps_course(before.text, row.text):
+                aside = aside_of(row.text)
+                end = self._joined_at(number) + self._sets_off(aside)
+                runs = action_of(row.text) in RUNS
+                found.append(JoinedTurn(before.part.end, before.part.end, end, aside, follows=True, runs=runs))
         return found
+
+    def _sets_off(self, aside: float) -> int:
+        """Return the frames in which a body turns to a side to which it goes."""
+        return round(SETS_OFF_S * self.limits.fps) if aside else 0
 
     def _joined_at(self, number: int) -> int:
         """Return the frame at which the transition to a row ends."""
