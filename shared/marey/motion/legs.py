@@ -16,6 +16,8 @@ from marey.motion.rotations import Array, between, dot, length, normalize, rotat
 from marey.motion.skeleton import Skeleton
 
 STRETCH = 0.99  # of its length: limit for a leg that was not straighter before (16 degrees)
+KNEE_ROOM = 0.03
+"""Metres of a knee over the floor."""
 MAX_DROP = 0.06  # metres that the hips come down for a foot; beyond that the foot leaves its place
 
 
@@ -64,7 +66,33 @@ def follow_feet(
         was = _without_backward_bend(before[:, leg], ahead, fps)
         wanted = soft_distance(was, length(ankle - hip), fps)
         joints[:, chain] = draw_foot(joints[:, chain], hip, wanted, hold)
-        joints[:, leg[1]] = two_bone_knee(was, hip, joints[:, leg[2]], ahead)
+        knee = two_bone_knee(was, hip, joints[:, leg[2]], ahead)
+        out = hip - joints[:, [l_hip, r_hip]].mean(axis=1)
+        joints[:, leg[1]] = knee_over_floor(knee, hip, joints[:, leg[2]], before[:, leg[1], 1], out)
+
+
+def knee_over_floor(knee: Array, hip: Array, ankle: Array, height: Array, out: Array) -> Array:
+    """Return knees (T, 3) turned about the line from hip to ankle until none is in the floor, or lower than before:
+    the straight leg of a body that lies on its front bends into it.
+
+    Args:
+        knee, hip, ankle: (T, 3) after the move, metres.
+        height: (T,) of the knee before.
+        out: (T, 3) direction away from the other leg, to which a knee turns that points straight down.
+    """
+    least = np.minimum(height, KNEE_ROOM)
+    if not (knee[:, 1] < least).any():
+        return knee
+    axis = normalize(ankle - hip)
+    foot = hip + axis * dot(knee - hip, axis)[:, None]
+    up = normalize(np.array([0.0, 1.0, 0.0]) - axis * axis[:, 1:2])
+    side = np.cross(axis, up)
+    bend = knee - foot
+    off = np.maximum(length(bend), 1e-9)
+    rises = np.clip((least - foot[:, 1]) / np.maximum(off * up[:, 1], 1e-9), -1.0, 1.0)
+    aside = np.where(dot(bend, side) / off + 0.3 * np.sign(dot(out, side)) < 0, -1.0, 1.0)
+    turned = rises[:, None] * up + (aside * np.sqrt(1.0 - rises**2))[:, None] * side
+    return np.where((knee[:, 1] < least)[:, None], foot + off[:, None] * turned, knee)
 
 
 def leg_lengths(leg: Array) -> tuple[Array, Array]:

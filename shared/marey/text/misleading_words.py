@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping
 
 from marey.text.action_reader import named_actions
+from marey.text.dropped_seats import with_seats_taken
 from marey.text.lost_footing import with_falls
 from marey.text.punched_air import with_pumped_fists
 from marey.vocabulary.bearing_words import stated_bearings
@@ -239,6 +240,10 @@ _ROLLS_FROM_THERE = re.compile(
 )
 """A body that lies and turns over, where the words do not say onto what: "lies on his back and rolls over"."""
 _ON_FRONT = re.compile(r"\b(?:stomach|belly|front|face[ -]?down|prone)\b", re.IGNORECASE)
+_LAY = re.compile(
+    r"\bl(?:ies|ie|ying|ay)\b(?! down)|\b(?:asleep|sleep\w*|crawl\w*|face[ -]?(?:up|down))\b", re.IGNORECASE
+)
+"""Words of a body that is down already."""
 _LYING = re.compile(r"\b(?:l(?:ies|ie|ying|ay)|asleep|sleep\w*|bed|prone|supine|floor|ground|over)\b", re.IGNORECASE)
 _OVER_KNEES = re.compile(
     r"""\b(?:falls?|drops?|sinks?|collapses?|goes|crumples?|slumps?)(?:[ ]\w+ly)?(?:[ ]down)?[ ](?:to|on|onto)
@@ -343,7 +348,7 @@ def without_misleading(prompt: str) -> str:
     dancer who leaps does so from one foot to the other.
     """
     prompt = _DOWN_AGAIN.sub(_down_again, _UP_AND_DOWN.sub(_up_and_down, prompt))
-    prompt = _DANCER_LEAPS.sub(_performs_a_leap, with_falls(prompt))
+    prompt = _DANCER_LEAPS.sub(_performs_a_leap, with_falls(with_seats_taken(prompt)))
     prompt = _DOER.sub(_as_person, _AT_WHEEL.sub(r"\g<drives>", prompt))
     prompt = _LAYS_LEG.sub(r"\g<sits> with one leg over the other", prompt)
     prompt = _ON_FLOOR.sub(_on_floor, _BACK_TO_WALL.sub(_against, prompt))
@@ -464,10 +469,12 @@ def _strikes_back(found: re.Match[str]) -> str:
 
 
 def _lies(found: re.Match[str]) -> str:
-    """Return a body that lies on another side."""
+    """Return a body that lies on another side; one that lay before comes to it, as a movement of its own."""
     if found[0].lower().startswith("turn") and not _LYING.search(found.string):
         return found[0]
     lies = "lying" if found["ing"] else "lies" if found["s"] else "lie"
+    if found["where"] and not found["where"].endswith("side") and _LAY.search(found.string[: found.start()]):
+        return f"{lies} down on {found['where']}"
     return f"{lies} on {found['where']}" if found["where"] else f"{lies} "
 
 

@@ -94,6 +94,13 @@ def _stops_and_looks(prompt: str) -> bool:
     return bool(stated_gaze(prompt)) and _STOPS.fullmatch(without_gaze(prompt)) is not None
 
 
+def _is_list_of(first: ReadMovement) -> bool:
+    """Return True if the first of several movements is the whole of which the others are listed as parts: "a karate
+    form: block, punch, kick"."""
+    whole, sign, _ = first.text.partition(":")
+    return bool(sign) and first.action in SERIES and first.action in named_actions(whole)
+
+
 class TrainedReaders:
     """Reads prompts by the trained readers."""
 
@@ -235,7 +242,7 @@ class TrainedReaders:
         read = self._read_bare(bare)
         sure = self._is_surely_one(bare, read)
         if self._movements and not sure and (movements := self._movements_in(bare, read.action)):
-            one = len(movements) == 1  # "drives, then swerves"
+            one = len(movements) == 1 or _is_list_of(movements[0])  # "drives, then swerves"
             each_side = tuple(side for each in movements for side in self._by_sides(each.text) or (each,))
             return ReadPrompt.of(bare.prompt, movements[0].action) if one else ReadPrompt(bare.prompt, each_side)
         surely = read.probability >= (SURELY_AGREED if read.least == AGREED else SURELY)

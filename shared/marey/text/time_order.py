@@ -94,6 +94,13 @@ _PUNCH_BEFORE = re.compile(
     re.IGNORECASE,
 )
 """A punch by its name before what is none, in a list: "jab, cross, roundhouse kick"."""
+_OPENING = re.compile(
+    r"""^(?P<opens>\W*(?:(?:before|after|prior\ to|while|when|once|upon)\ (?:\w+ly\ )?\w+ing|having)\b[^,;.:]*?
+    (?<!\bwho)(?<!\bwhat)(?<!\bthat)(?<!\bas)(?<!\bwhere)(?<!\bhow)(?<!\bwhen)(?<!\bwhile)(?<!\bthan)(?<!\bbefore)
+    (?<!\bafter)(?<!\buntil)(?<!\bif)(?<!\bbecause))\ (?P<who>he|she|they)\ (?=\w)""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""Beginnings without a subject before the person that the prompt is of: "before sitting down she waves"."""
 _AS_SOON_AS = re.compile(r"\bas soon as ", re.IGNORECASE)
 _NUMBER = re.compile(r"(?:^|(?<=[\s,;.]))\(?(?P<number>\d{1,2})[.):]\s+(?=[^\W\d])")
 LEAST_NUMBERS = 2
@@ -121,7 +128,8 @@ _DOER = re.compile(
 def in_time_order(prompt: str) -> str:
     """Return a prompt with its actions in the order of time, and with the words of those that it leaves out: "claps,
     then sits down" of "before she sits down, she claps". Any other prompt is returned as it is."""
-    text = told_in_order(_AS_SOON_AS.sub("once ", _without_numbers(prompt)), _does_so)
+    opened = _OPENING.sub(r"\g<opens>, \g<who> ", _without_numbers(prompt), count=1)
+    text = told_in_order(_AS_SOON_AS.sub("once ", opened), _does_so)
     text = _AFTER.sub(_after, _BEFORE.sub(_before, text))
     text = _BACK_UP.sub(r"\g<rise> up", _TRIPS.sub(_trips, text))
     text = _FALLS_AND_CLIMBS.sub(lambda up: f"{up['falls']}get{up['s'] or ''} up", text)

@@ -5,7 +5,24 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from marey.drawing.holds import BACK, CROUCH, FLOOR, FOURS, FRONT, KNEE, KNEES, PLANK, PRONE, SEAT, SLIDE, UPRIGHT
+from marey.drawing.holds import (
+    BACK,
+    CROSSED,
+    CROUCH,
+    FLOOR,
+    FOURS,
+    FRONT,
+    KNEE,
+    KNEES,
+    LEFT_SIDE,
+    PLANK,
+    PRONE,
+    RIGHT_SIDE,
+    SEAT,
+    SLIDE,
+    UPRIGHT,
+)
+from marey.drawing.low_deeds import PICKS, POUNDS, REACHES, LowDeed
 from marey.generation.drawn_whole import drawn_whole
 from marey.generation.fine_wish import FineWish
 from marey.generation.posture import NO_POSTURE, RowPosture
@@ -14,7 +31,18 @@ from marey.motion.features import HUMANML3D_263, encode_all
 
 LAYOUT, FPS = HUMANML3D_263, HUMANML3D_263.fps
 LIES = dict.fromkeys((BACK, FRONT, PRONE), 0.125)
-LOW = {SEAT: 0.5, FLOOR: 0.17, UPRIGHT: 0.17, KNEES: 0.51, KNEE: 0.51, FOURS: 0.47, PLANK: 0.4, CROUCH: 0.52, **LIES}
+LOW = {
+    SEAT: 0.5,
+    CROSSED: 0.5,
+    FLOOR: 0.17,
+    UPRIGHT: 0.17,
+    KNEES: 0.51,
+    KNEE: 0.51,
+    FOURS: 0.47,
+    PLANK: 0.4,
+    CROUCH: 0.52,
+    **LIES,
+}
 STANDS_M, NEAR_M = 0.93, 0.15
 SOLE_M = 0.03
 """Metres of the lowest joint of a drawn body over its floor; features have it on the floor."""
@@ -42,7 +70,7 @@ def test_every_posture_leads_to_every_other(begin: str, end: str) -> None:
     joints = joints_of(RowPosture(begin, end, end, seed=2))
     assert joints[0, 0, 1] == pytest.approx(LOW[begin], abs=NEAR_M)
     assert joints[-1, 0, 1] == pytest.approx(LOW[end], abs=NEAR_M)
-    assert joints[..., 1].min() > -0.1
+    assert joints[..., 1].min() > -0.03, "no knee goes through the floor"
 
 
 def test_who_sits_up_does_so_once() -> None:
@@ -167,3 +195,48 @@ def test_a_movement_that_ends_low_goes_on_from_there(action: str, leaves: str, e
     assert np.linalg.norm(np.diff(joints, axis=0), axis=-1).max() < 0.35, "no joint leaps"
     same = RowPosture(leaves=leaves, end=leaves, seed=seed)
     assert gone_on(made.features, LAYOUT, same) is made.features
+
+
+@pytest.mark.parametrize("own", sorted(REACHES))
+@pytest.mark.parametrize("hand", ["left", "right", "both"])
+def test_hands_reach_the_floor_from_low_postures(own: str, hand: str) -> None:
+    held = RowPosture(own, own, own, deed=LowDeed(PICKS, hand), seed=1)
+    joints = joints_of(held)
+    reached = joints[:, [20, 21], 1].min(0) < 0.2
+    assert reached[0] or hand == "right"
+    assert reached[1] or hand == "left"
+    assert joints[:, 0, 1].max() < joints[0, 0, 1] + 0.05, "it does not stand up"
+    assert joints[..., 1].min() > -0.03
+
+
+def test_fists_beat_the_floor_as_often_as_is_said() -> None:
+    wrists = joints_of(RowPosture(KNEES, KNEES, KNEES, deed=LowDeed(POUNDS, "both", 3), seed=1))[:, 20, 1]
+    down = wrists < 0.2
+    assert np.count_nonzero(down[1:] & ~down[:-1]) == 3
+
+
+@pytest.mark.parametrize(("begin", "own"), [(BACK, FRONT), (FRONT, BACK)])
+def test_who_lies_rolls_over_on_the_floor(begin: str, own: str) -> None:
+    joints = joints_of(RowPosture(begin, own, own, seed=1))
+    assert joints[:, 0, 1].max() < 0.45, "it does not stand up in between"
+    assert -0.03 < joints[..., 1].min(1).min() <= joints[..., 1].min(1).max() < 0.12
+    heads = joints[:, 15, 1] - joints[:, 12, 1]
+    assert np.abs(heads).max() < 0.25
+    across = joints[:, 1] - joints[:, 2]
+    front = np.cross(across, joints[:, 12] - joints[:, 0])[:, 1]
+    assert (front[0] > 0) != (front[-1] > 0), "the front turns to the other side"
+
+
+def test_who_rolls_over_twice_lies_as_before() -> None:
+    once, twice = (joints_of(RowPosture(BACK, BACK, BACK, halves=halves, seed=1)) for halves in (0, 2))
+    assert len(twice) > len(once) + 10
+    assert np.abs((twice[-1] - twice[-1, :1]) - (twice[0] - twice[0, :1]))[:, 1].max() < 0.1
+
+
+@pytest.mark.parametrize("begin", [LEFT_SIDE, RIGHT_SIDE])
+def test_who_lies_on_a_side_comes_up_over_hands_and_knees(begin: str) -> None:
+    joints = joints_of(RowPosture(begin, "", "", seed=1))
+    assert joints[0, 0, 1] < 0.35
+    assert joints[-1, 0, 1] == pytest.approx(STANDS_M, abs=NEAR_M)
+    assert np.linalg.norm(np.diff(joints, axis=0), axis=-1).max() < 0.35
+    assert joints[..., 1].min(1).max() < 0.13, "it never leaves the floor"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from marey.drawing.low_deeds import LowDeed
 from marey.generation.posture import RowPosture
 from marey.generation.row_postures import is_as_alone, row_postures
 
@@ -204,3 +205,58 @@ def test_who_rises_to_a_crouch_stays_in_it_to_creep(low: tuple[str, str], said: 
 def test_who_is_on_the_hands_stands_up_to_use_them(low: tuple[str, str]) -> None:
     assert postures(low, ("wave", "waves")) == [("", "", ""), ("", "", "")]
     assert postures(low, ("idle", "pauses"))[1][0] != ""
+
+
+@pytest.mark.parametrize(
+    ("down", "posture"),
+    [
+        (("kneel", "kneels on one knee"), "knee"),
+        (("crouch", "crouches"), "crouch"),
+        (("sit-floor", "sits down on the floor"), "floor"),
+        (("sit", "sits on a chair"), "seat"),
+    ],
+)
+def test_things_are_picked_up_where_the_body_is(down: tuple[str, str], posture: str) -> None:
+    rows = row_postures([down, ("pick-up", "picks up a key from the floor"), ("get-up", "stands back up")], 1)
+    assert [each.own for each in rows] == [posture, posture, ""]
+    assert rows[1].is_drawn
+    assert rows[1].deed == LowDeed("picks")
+    assert rows[2].begin == posture
+
+
+def test_what_lies_on_a_table_is_picked_up_from_there() -> None:
+    rows = row_postures([("sit", "sits at a desk"), ("pick-up", "picks up a pen with her left hand")], 1)
+    assert rows[1].deed == LowDeed("picks", "left", high=True)
+
+
+def test_legs_are_crossed_on_the_seat() -> None:
+    rows = postures(("sit", "sits on a chair"), ("", "crosses her legs"), ("nod", "nods"), ("", "uncrosses her legs"))
+    assert [own for _, own, _ in rows] == ["seat", "crossed", "crossed", "seat"]
+
+
+def test_fists_beat_the_floor_on_the_knees() -> None:
+    rows = row_postures([("kneel", "kneels down"), ("", "pounds the ground with both fists"), ("", "gets up")], 1)
+    assert [each.own for each in rows] == ["knees", "knees", ""]
+    assert rows[1].deed is not None
+    assert row_postures([("walk", "walks"), ("idle", "beats the floor with his fists")], 1)[1].own == "knees"
+
+
+def test_who_lies_rolls_over() -> None:
+    rows = row_postures([("lie", "lies on his back"), ("roll", "rolls over twice"), ("roll", "rolls over")], 1)
+    assert [(each.own, each.halves) for each in rows] == [("back", 0), ("back", 2), ("front", 1)]
+    assert row_postures([("lie", "lies on his back"), ("roll", "does a forward roll")], 1)[1].own == ""
+
+
+@pytest.mark.parametrize(
+    ("dives", "posture"),
+    [("dives to the left", "left-side"), ("dives to his right", "right-side"), ("dives for cover", "front")],
+)
+def test_who_dives_gets_up_from_where_the_dive_ends(dives: str, posture: str) -> None:
+    rows = row_postures([("idle", dives), ("idle", "gets up"), ("clap", "claps")], 1)
+    assert (rows[0].leaves, rows[0].end) == (posture, posture)
+    assert (rows[1].begin, rows[1].is_drawn) == (posture, True)
+
+
+def test_a_run_begins_in_the_crouch() -> None:
+    rows = row_postures([("crouch", "crouches"), ("idle", "peeks to the left"), ("run", "runs off")], 1)
+    assert [each.end for each in rows] == ["crouch", "crouch", ""]

@@ -10,7 +10,7 @@ import pytest
 
 from marey.generation.fine import FINE, drawn_features
 from marey.generation.fine_wish import FineWish
-from marey.generation.whole_body import CHOICES, QUICKER, is_drawn
+from marey.generation.whole_body import CHOICES, QUICKER, half_turns, is_drawn, lies_and_rolls
 from marey.motion.features import HUMANML3D_263
 from marey.posing.still import standing_still
 from marey.quality.measure import range_degrees
@@ -352,3 +352,18 @@ def test_a_plain_jump_out_of_a_run_is_no_split(seed: int) -> None:
     joints = drawn("leap", "running jump forward", seed=seed)
     high = int(joints[:, PELVIS, 1].argmax())
     assert np.linalg.norm(joints[high, 7] - joints[high, 8]) < 0.85
+
+
+@pytest.mark.parametrize(("text", "halves"), [("rolls over on the floor", 1), ("rolls over twice on the grass", 2)])
+def test_who_rolls_over_on_the_floor_lies_there(text: str, halves: int) -> None:
+    assert (lies_and_rolls(text), half_turns(text)) == (True, halves)
+    features = drawn_features(
+        HUMANML3D_263.encode(standing_still(80, random.Random(1))), HUMANML3D_263, "roll", FineWish(prompt=text), 1
+    )
+    assert features is not None
+    assert HUMANML3D_263.decode(features)[:, 0, 1].max() < 0.5, "it never stands"
+
+
+@pytest.mark.parametrize("text", ["rolls over his shoulder", "does a forward roll", "rolls over to his feet"])
+def test_other_rolls_are_those_of_who_stands(text: str) -> None:
+    assert not lies_and_rolls(text)

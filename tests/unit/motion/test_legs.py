@@ -12,6 +12,7 @@ from marey.motion.legs import (
     draw_foot,
     follow_feet,
     foot_chain,
+    knee_over_floor,
     leg_lengths,
     needed_drop,
     soft_distance,
@@ -296,3 +297,16 @@ def test_knees_that_bend_forward_or_far_backward_are_left() -> None:
     ahead = np.tile(AHEAD, (80, 1))
     for leg in (bent_back(-0.02), bent_back(0.08)):
         np.testing.assert_array_equal(_without_backward_bend(leg, ahead, 20.0), leg)
+
+
+def test_a_knee_is_turned_out_of_the_floor() -> None:
+    hip, ankle = np.array([[0.1, 0.1, 0.0]]), np.array([[0.1, 0.1, -0.7]])
+    knee = np.array([[0.1, -0.1, -0.35]])
+    height, out = np.array([0.08]), np.array([[0.1, 0.0, 0.0]])
+    turned = knee_over_floor(knee, hip, ankle, height, out)
+    assert turned[0, 1] > 0.0
+    assert turned[0, 0] > 0.1, "away from the other leg"
+    for joint in (hip, ankle):
+        assert length(turned - joint) == pytest.approx(length(knee - joint))
+    over = knee + np.array([0.0, 0.3, 0.0])
+    assert np.array_equal(knee_over_floor(over, hip, ankle, height, out), over)

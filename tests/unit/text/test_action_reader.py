@@ -76,17 +76,17 @@ def test_prompts_whose_words_name_several_actions_must_be_read_surely() -> None:
 
 
 def test_the_only_action_that_the_words_name_is_believed_sooner() -> None:
-    (read_as,) = read(["a man ambles"])
+    (read_as,) = read(["a man traipses"])
     assert read_as.action == "walk"
     assert AGREED <= read_as.probability < SURE
 
 
 def test_an_action_that_the_words_are_only_close_to_is_not_believed_sooner() -> None:
-    (waddles,) = read(["a man waddles"])
-    assert named_actions("a man waddles") == {"walk"}
-    assert named_actions("a man waddles", surely=True) == set()
-    assert (waddles.name, waddles.action) == ("walk", None)
-    assert AGREED < waddles.probability < SURE
+    (roams,) = read(["a man roams"])
+    assert named_actions("a man roams") == {"walk"}
+    assert named_actions("a man roams", surely=True) == set()
+    assert (roams.name, roams.action) == ("walk", None)
+    assert AGREED < roams.probability < SURE
 
 
 def test_who_stands_by_the_words_does_where_the_network_knows_nothing() -> None:

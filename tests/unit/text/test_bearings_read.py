@@ -22,7 +22,7 @@ def reading() -> TextPipeline:
 @pytest.mark.parametrize(
     ("prompt", "read"),
     [
-        ("a sad woman walks with her head hanging", "a person walks forward, a woman walks"),
+        ("a sad woman walks with her head hanging", "a person walks forward"),
         ("a soldier salutes", STANDS),
         ("a man crosses his arms and looks left", STANDS),
         ("a person sits and thinks with his hand on his chin", "a person sits on a chair, a person sits"),
@@ -31,12 +31,12 @@ def reading() -> TextPipeline:
             "a person strikes with the fist, a limping boxer throws a punch",
         ),  # not drawn
         ("an old chair falls over", "an old chair falls over"),
-        ("a man carries a heavy box to the door", "a person walks forward, a man walks to the door"),
+        ("a man carries a heavy box to the door", "a person walks forward"),
         ("a person walks with a load", "a person walks with a load"),
         ("does three burpees", STANDS),
         ("leans against the wall with folded arms", STANDS),
         ("leans on a railing", STANDS),
-        ("wades through the river", "a person walks forward, a person walks"),
+        ("wades through the river", "a person walks forward"),
         ("look up at sky", STANDS),
         ("rubs the back of the neck", STANDS),
         ("the fencer lunges", STANDS),
@@ -63,7 +63,7 @@ def test_the_model_reads_what_is_not_drawn(reading: TextPipeline, prompt: str, r
         (
             "an old man walks to a bench and sits down",
             [
-                ("an old man walks to a bench", "a person walks forward, a man walks"),
+                ("an old man walks to a bench", "a person walks forward"),
                 ("sits down", "a person sits down"),
             ],
         ),

@@ -18,6 +18,9 @@ from marey.text.time_order import in_time_order
         ("after clapping twice, the old man kneels", "the old man claps twice, then kneels"),
         ("Before the match, the fencer salutes.", "Before the match, the fencer salutes."),
         ("after a while, she kneels", "after a while, she kneels"),
+        ("before sitting down she waves", "she waves, then sits down"),
+        ("having bowed deeply he leaves", "having bowed deeply, he leaves"),
+        ("After sitting where he likes the boy sleeps", "After sitting where he likes the boy sleeps"),
     ],
 )
 def test_what_comes_first_is_told_first(prompt: str, read: str) -> None:

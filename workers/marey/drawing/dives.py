@@ -59,6 +59,37 @@ def side_dive(rng: random.Random, side: str = "") -> Gesture:
     return (done if right else done.mirrored()).gesture(rng, ["side-dive"], RIGHT if right else LEFT)
 
 
+def cover_dive(rng: random.Random, *, runs: bool = True) -> Gesture:
+    """A body that throws itself ahead and down, as behind cover, and lands on its chest with both arms ahead.
+
+    Args:
+        rng: decides everything that is not given.
+        runs: it takes some steps before.
+    """
+    far, lasts = rng.uniform(1.15, 1.4), rng.uniform(0.4, 0.46)
+    done = Tumble(times=[rng.uniform(0.1, 0.3)])
+    z = steps_in(rng, done, 0.9) if runs else 0.0
+    ahead = pair(Limb((0.0, 0.46, 0.3), towards=(0.8, 0.1, 0.5)))
+    trails = pair(Limb((0.12, -0.88, 0.03), towards=(0.2, -0.95, -0.2)))
+    swung = pair(Limb((0.2, -0.3, -0.2), towards=(0.7, 0.1, -0.7)))
+    load = Whole((0.0, z + 0.02), 0.68, (40, 0, 0), (18, 0, 0), (-26, 0, 0), swung, stood(0, z), splay=0.25)
+    toes = {side: Limb((0.0, 0.06, z), OWN) for side in (LEFT, RIGHT)}
+    off = Whole((0.0, z + 0.42), 0.82, (54, 0, 0), (2, 0, 0), (-30, 0, 0), ahead, toes, splay=0.12)
+    air = Whole((0.0, z + 0.4 + 0.6 * far), 0.62, (84, 0, 0), (-8, 0, 0), (-34, 0, 0), ahead, trails, splay=0.12)
+    lands = Whole((0.0, z + 0.4 + far), 0.15, (86, 0, 0), (-4, 0, 0), (-30, 0, 0), ahead, trails, 1.0, 0.2)
+    flat = pair(Limb((0.14, 0.26, 0.06), towards=(0.9, -0.3, 0.2)))
+    done.then(0.3 if runs else 0.45, load)
+    done.then(0.24, off)
+    begins = done.times[-1]
+    done.then(0.55 * lasts, air)
+    done.then(0.45 * lasts, lands)
+    done.flights.append((begins, begins + lasts))
+    slid = z + 0.4 + far + rng.uniform(0.15, 0.3)
+    done.then(0.3, replace(lands, at=(0.0, slid)))
+    done.then(0.4, replace(lands, at=(0.0, slid), hands=flat, neck=(-14, 0, 0)), rng.uniform(0.4, 0.9))
+    return done.gesture(rng, ["cover-dive"])
+
+
 def ground_slide(rng: random.Random, *, rises: bool = True) -> Gesture:
     """A body that runs up, slides on one hip with a leg ahead, and gets up.
 

@@ -23,19 +23,24 @@ from marey.drawing.floor import (
     slid,
 )
 from marey.drawing.kneels import kneeling
+from marey.drawing.low_deeds import LowDeed, deed_steps
 from marey.drawing.postures import STAND, Posture, mirrored
-from marey.drawing.seats import seated_on_seat
+from marey.drawing.seats import crossed_on_seat, seated_on_seat
 from marey.drawing.sequels import Sequel, Step
 
 SEAT, FLOOR, UPRIGHT, KNEES, KNEE = "seat", "floor", "upright", "knees", "knee"
 RIGHT_KNEE = "right-knee"
 CROUCH, BACK, FRONT, PRONE, SLIDE, FOURS = "crouch", "back", "front", "prone", "slide", "fours"
-PLANK = "plank"
+PLANK, CROSSED = "plank", "crossed"
+LEFT_SIDE, RIGHT_SIDE = "left-side", "right-side"
 """Names of postures: on a seat; on the floor, legs crossed, or stretched as those of who lay there; on both knees, or
 on one, the left or the right; crouched; on the back, and on the front; on the front with a gun aimed, on the elbows; on
-the seat behind the feet, after a slide; on hands and knees; on hands and toes."""
+the seat behind the feet, after a slide; on hands and knees; on hands and toes; on a seat with one leg over the other;
+on a side, as who dived there (`marey.drawing.floor_ways`)."""
 SITTING, KNEELING = frozenset({FLOOR, UPRIGHT}), frozenset({KNEES, KNEE, RIGHT_KNEE, FOURS})
-LYING = frozenset({BACK, FRONT, PRONE})
+SIDES_DOWN = frozenset({LEFT_SIDE, RIGHT_SIDE})
+LYING = frozenset({BACK, FRONT, PRONE}) | SIDES_DOWN
+SEATED = frozenset({SEAT, CROSSED})
 ON_HANDS = frozenset({FOURS, PLANK})
 BEGINS_S, STANDS_S = 0.3, 0.5
 """Seconds in which a body waits before it moves, in a posture and standing."""
@@ -65,7 +70,7 @@ def hold_named(name: str, rng: random.Random) -> Hold:
     return Hold(*_HOLDS[name](rng))
 
 
-def passing(begin: str, own: str, end: str, seconds: float, seed: str) -> Sequel:
+def passing(begin: str, own: str, end: str, seconds: float, seed: str, deed: LowDeed | None = None) -> Sequel:
     """Return a body that goes from a posture to another, stays there, and goes on to a third; empty = standing.
 
     Args:
@@ -74,15 +79,19 @@ def passing(begin: str, own: str, end: str, seconds: float, seed: str) -> Sequel
         end: of the last one.
         seconds: that it stays.
         seed: decides the postures.
+        deed: what the hands do there, before it stays.
     """
-    holds = {name: hold_named(name, random.Random(f"{seed} {name}")) for name in (begin, own, end) if name}  # noqa: S311
+    holds = {name: _hold(name, seed) for name in (begin, own, end) if name}
     between = [UPRIGHT] if LYING & set(holds) else []
-    for name in (*between, *([FRONT] if PRONE in holds else [])):
-        holds.setdefault(name, hold_named(name, random.Random(f"{seed} {name}")))  # noqa: S311
+    for name in (*between, *([FRONT] if PRONE in holds else []), *([SEAT] if CROSSED in holds else [])):
+        holds.setdefault(name, _hold(name, seed))
     waits = BEGINS_S if begin else STANDS_S
     done = Sequel([waits if begin != own != SLIDE else 0.0], [holds[begin].low if begin else STAND])
     for step in _way(holds, begin, own):
         done.then(*step)
+    if deed is not None:
+        for step in deed_steps(deed, own, holds[own].low, random.Random(f"{seed} {deed.kind}")):  # noqa: S311
+            done.then(*step)
     if seconds > 0.0:
         done.then(seconds, done.postures[-1])
     for step in _way(holds, own, end):
@@ -90,10 +99,19 @@ def passing(begin: str, own: str, end: str, seconds: float, seed: str) -> Sequel
     return done
 
 
+def _hold(name: str, seed: str) -> Hold:
+    """Return the posture of a name that all parts of a motion of the same seed share, on the same seat."""
+    return hold_named(name, random.Random(f"{seed} {SEAT if name in SEATED else name}"))  # noqa: S311
+
+
 def _way(holds: Mapping[str, Hold], begin: str, end: str) -> tuple[Step, ...]:
     """Return the steps from a posture to another."""
     if begin == end:
         return ()
+    if begin == CROSSED:
+        return (*holds[CROSSED].up[:2], *_way(holds, SEAT, end)) if end else holds[CROSSED].up
+    if end == CROSSED:
+        return (*_way(holds, begin, SEAT), *holds[CROSSED].down[-2:]) if begin else holds[CROSSED].down
     if end == PRONE:
         return (*_way(holds, begin, FRONT), holds[FRONT].up[0], *holds[PRONE].down)
     if begin == PRONE:
@@ -127,7 +145,7 @@ def _way(holds: Mapping[str, Hold], begin: str, end: str) -> tuple[Step, ...]:
         return (*holds[FOURS].up[:-1], (PASSES_S, holds[CROUCH].low))
     if {begin, end} == {SEAT, FOURS}:  # over the feet
         return (*holds[begin].up[:-1], *holds[end].down)
-    if {begin, end} & SITTING and {begin, end} & KNEELING:  # legs do not pass under the hips
+    if {begin, end} & SITTING and {begin, end} & {*KNEELING, CROUCH}:  # legs do not pass under the hips
         return (*holds[begin].up[:-1], *holds[end].down)
     return ((PASSES_S, holds[end].low),)
 
@@ -162,6 +180,7 @@ def _crouched(rng: random.Random) -> tuple[Posture, tuple[Step, ...], tuple[Step
 
 _HOLDS: Mapping[str, Callable[[random.Random], tuple[Posture, tuple[Step, ...], tuple[Step, ...]]]] = {
     SEAT: seated_on_seat,
+    CROSSED: crossed_on_seat,
     FLOOR: lambda rng: _on_floor(rng, "floor-crossed"),
     UPRIGHT: lambda rng: _on_floor(rng, "floor-stretched"),
     KNEES: lambda rng: _on_knees(rng, one=False),

@@ -36,6 +36,9 @@ _TRUNK_ROOM, _THIGH_ROOM = 0.14, 0.08  # metres from a wrist to the axis of the 
 _OUT = 0.04  # metres; nearer to the axis than this, a wrist is moved outward
 _ELBOW_LIFT = (0.9, 1.0, 0.0)  # outward, up and forward
 _LIFTED = 0.07  # an elbow below this height is lifted
+_KNEE_LIFT = (1.0, 0.6, 0.2)  # likewise a knee, which goes aside
+_KNEE_ROOM = 0.03  # a knee below this height is lifted
+_LIFTS = 4  # times that the knees are solved until none is in the floor
 _STRAIGHT = 0.03  # metres; a knee that is bent by less points where the foot does
 _STEP = 0.03  # metres; a foot that goes farther over the floor is lifted
 _FLOOR = 0.2  # metres of an ankle
@@ -156,9 +159,14 @@ class _Posing:
         pole = self._track(
             [normalize(np.array(posture.knees.get(side, self.bends[side]))) for posture in self.postures]
         )
-        joints[:, knee], _ = two_bones(
-            joints[:, hip], joints[:, ankle], self._world(pole, side), (BONE_LENGTHS[knee], BONE_LENGTHS[ankle])
-        )
+        pole, aside = self._world(pole, side), self._world(np.array(_KNEE_LIFT), side)
+        lengths = (BONE_LENGTHS[knee], BONE_LENGTHS[ankle])
+        for _ in range(_LIFTS):
+            joints[:, knee], _ = two_bones(joints[:, hip], joints[:, ankle], pole, lengths)
+            sunk = np.clip((_KNEE_ROOM - joints[:, knee, 1]) / _KNEE_ROOM, 0.0, 2.0)
+            if not sunk.any():
+                break
+            pole = normalize(pole) + blurred(sunk, 2.0)[:, None] * aside
 
     def _bend(self, side: str) -> Array:
         """Where a knee of the idle points (3,); a straight one, where the foot does."""

@@ -85,6 +85,25 @@ def _legs_crossed(rng: random.Random, seated: Posture) -> Posture:
     )
 
 
+def crossed_on_seat(rng: random.Random) -> tuple[Posture, tuple[Step, ...], tuple[Step, ...]]:
+    """Return a posture on the seat of `seated_on_seat` with one leg over the other, and the steps to it from standing
+    and back; the last two and the first two are those from the seat and to it."""
+    seated, down, up = seated_on_seat(rng)
+    crossed = replace(_legs_crossed(rng, seated), pelvis=seated.pelvis)
+    lifted = _leg_lifted(crossed, seated)
+    return crossed, (*down, (0.4, lifted), (0.45, crossed)), ((0.4, lifted), (0.45, seated), *up)
+
+
+def _leg_lifted(crossed: Posture, seated: Posture) -> Posture:
+    """The posture on the way to legs that are crossed."""
+    return replace(
+        crossed,
+        feet={side: replace(foot, at=(0.06, 0.34, 0.1)) if foot.toes else foot for side, foot in crossed.feet.items()},
+        knees=dict.fromkeys(SIDES, (0.2, 0.9, 1.0)),
+        hands=seated.hands,
+    )
+
+
 def sit_legs_crossed(rng: random.Random, *, down: bool = False, seconds: float | None = None) -> Gesture:
     """A body that sits on a seat and lays one leg over the other, where it stays.
 
@@ -96,12 +115,7 @@ def sit_legs_crossed(rng: random.Random, *, down: bool = False, seconds: float |
     _, seated = _seated(rng)
     seated = replace(seated, spine=(rng.uniform(0, 8), 0, rng.uniform(-3, 3)), hands=both(_HANDS["sit-thighs"]))
     crossed = _legs_crossed(rng, seated)
-    lifted = replace(
-        crossed,
-        feet={side: replace(foot, at=(0.06, 0.34, 0.1)) if foot.toes else foot for side, foot in crossed.feet.items()},
-        knees=dict.fromkeys(SIDES, (0.2, 0.9, 1.0)),
-        hands=seated.hands,
-    )
+    lifted = _leg_lifted(crossed, seated)
     done = Sequel([rng.uniform(0.3, 0.6)], [STAND if down else seated])
     if down:
         fall = rng.uniform(*_PACES[""])

@@ -167,6 +167,8 @@ def borne_spans(request: Request, fps: float, frames: int) -> list[BorneSpan]:
         kept = [each for each in carried if not any(_replaces(other, each) for other in own)]
         posed = _posed(row, action)
         stated = fitting(_with_drawn([*whole, *kept, *own], action, row.text.said), posed)
+        if row.held.deed is not None:  # the hands are at work
+            stated = tuple(each for each in stated if not (each.bearing.arms or each.bearing.gesture))
         if request.is_sequence:
             carried = [each for each in (*kept, *own) if each in stated and each.bearing.lasts]
         if stated:

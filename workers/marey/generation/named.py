@@ -14,9 +14,10 @@ from collections.abc import Callable, Mapping
 from marey.drawing.bat_swings import bat_swing
 from marey.drawing.bounces import toe_bounces
 from marey.drawing.burpees import burpees
-from marey.drawing.dives import ground_slide, side_dive
+from marey.drawing.dives import cover_dive, ground_slide, side_dive
 from marey.drawing.doors import pulled_door, pushed_door
 from marey.drawing.errands import cower, curtsy, rowing, shelf_lift, shoe_tied
+from marey.drawing.floor_ways import ground_pounded
 from marey.drawing.gesture import SIDES, Gesture
 from marey.drawing.knee_raises import knee_raise
 from marey.drawing.knee_strikes import knee_strike
@@ -34,6 +35,7 @@ from marey.drawing.vacuuming import vacuuming
 from marey.generation.dancing import named_dance
 from marey.generation.fine_wish import FineWish
 from marey.generation.stepping_aside import goes_diagonally
+from marey.generation.whole_body import lies_and_rolls
 from marey.posing.standing import OTHER_SIDE
 from marey.vocabulary.bearing_words import stated_bearings
 from marey.vocabulary.bearings import StatedBearing
@@ -98,10 +100,11 @@ def named_movement(wish: FineWish, rng: random.Random, seconds: float | None) ->
 
 
 def names_movement(prompt: str) -> bool:
-    """Return True if a prompt asks for a movement or a dance by name, for a gait in place or for diagonal steps: no
-    rule of an action is for it."""
+    """Return True if a prompt asks for a movement or a dance by name, for a roll of who lies, for a gait in place or
+    for diagonal steps: no rule of an action is for it."""
     moves = any(each.bearing.moves for each in stated_bearings(prompt))
-    return moves or bool(named_dance(prompt)) or goes_in_place(prompt, "walk") or goes_diagonally(prompt)
+    rolls = lies_and_rolls(prompt.lower())
+    return moves or rolls or bool(named_dance(prompt)) or goes_in_place(prompt, "walk") or goes_diagonally(prompt)
 
 
 def _times(stated: StatedBearing) -> int | None:
@@ -166,8 +169,19 @@ def _stagger(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds:
 
 
 def _side_dive(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del seconds
+    rises = any(wish.beside[1:])  # from the side that is known
+    return side_dive(rng, stated.side or ("right" if rises else ""))
+
+
+def _cover_dive(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del stated, seconds
+    return cover_dive(rng, runs=not wish.beside[0])
+
+
+def _pound_ground(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
     del wish, seconds
-    return side_dive(rng, stated.side)
+    return ground_pounded(rng, stated.side, _times(stated))
 
 
 def _ground_slide(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
@@ -293,6 +307,8 @@ NAMED: Mapping[str, Callable[[StatedBearing, FineWish, random.Random, float | No
     "side-gallop": _side_gallop,
     "stagger": _stagger,
     "side-dive": _side_dive,
+    "cover-dive": _cover_dive,
+    "pound-ground": _pound_ground,
     "ground-slide": _ground_slide,
     "tennis-serve": _tennis_serve,
     "javelin-throw": _field_throw,

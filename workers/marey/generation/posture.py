@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from marey.drawing.holds import KNEES
+from marey.drawing.low_deeds import LowDeed
 
 
 @dataclass(frozen=True)
@@ -21,6 +22,9 @@ class RowPosture:
         falls: the movement comes to its posture by itself.
         fires: shots go off in the posture.
         leaves: in which a movement ends that is drawn by itself; empty = on the feet, or in `own`.
+        deed: what the hands do in the posture, with or on what lies there.
+        halves: half turns of a body that lies and rolls over; 0 = as many as lie between two postures.
+        rolls_to: left or right, to which it rolls; empty = the shorter way.
         seed: of all rows, so that they meet in the same posture.
     """
 
@@ -33,6 +37,9 @@ class RowPosture:
     falls: bool = False
     fires: bool = False
     leaves: str = ""
+    deed: LowDeed | None = None
+    halves: int = 0
+    rolls_to: str = ""
     seed: int = 0
 
     @property

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.checks.kinematics import smooth
+from marey.drawing.floor_ways import rolls_between, way_over_floor
 from marey.drawing.holds import BACK, FRONT, PRONE, SLIDE, SLIDES_M, SLIDES_S, passing
 from marey.drawing.passing import pose
 from marey.drawing.shots import prone_shots
@@ -73,8 +74,8 @@ def drawn_posture(layout: FeatureLayout, held: RowPosture, said: str, seed: int,
         frames: that it keeps; None = as many as it takes.
     """
     rng = random.Random(f"{seed} posture")  # noqa: S311
-    stays = PASSES_ON_S if held.end not in ("", held.own) else STAYS_S
-    stays = AIMS_S if held.own == PRONE else WAITS_S if held.begin == held.own else stays
+    stays = PASSES_ON_S if held.end not in ("", held.own) or held.deed is not None else STAYS_S
+    stays = AIMS_S if held.own == PRONE else WAITS_S if held.begin == held.own and held.deed is None else stays
     seconds = rng.uniform(*stays) if held.own else 0.4
     return encode_all(layout, _fitted(held, max(seconds, gestures_s(said)), frames))
 
@@ -147,10 +148,14 @@ def gestures_s(said: str) -> float:
 
 def _fitted(held: RowPosture, seconds: float, frames: int | None) -> Array:
     """Return joints (T, 22, 3) of a body that passes its postures and stays so long in its own, or fills `frames`."""
-    least = passing(held.begin, held.own, held.end, 0.0, str(held.seed)).times[-1]
+    names = held.begin, held.own, held.end
+    if held.halves or rolls_between(*names):
+        rolled = way_over_floor(*names, seconds, held.seed, halves=held.halves, side=held.rolls_to)
+        return rolled if frames is None or len(rolled) == frames else retimed(rolled, frames)
+    least = passing(*names, 0.0, str(held.seed), held.deed).times[-1]
     if frames is not None:
         seconds = max(frames / FPS - least, 0.1)
-    done = passing(held.begin, held.own, held.end, seconds, str(held.seed))
+    done = passing(*names, seconds, str(held.seed), held.deed)
     if held.fires:
         done = prone_shots(done, seconds, random.Random(f"{held.seed} fires"))  # noqa: S311
     own = max(round(done.times[-1] * FPS) + 1, 2)

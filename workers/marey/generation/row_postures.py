@@ -12,28 +12,45 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
+from marey.drawing.floor_ways import FLAT, OPPOSITE
+from marey.drawing.gesture import BOTH
 from marey.drawing.holds import (
     BACK,
+    CROSSED,
     CROUCH,
     FLOOR,
     FOURS,
     FRONT,
     KNEE,
     KNEES,
+    LEFT_SIDE,
     LYING,
     ON_HANDS,
     PLANK,
     PRONE,
     RIGHT_KNEE,
+    RIGHT_SIDE,
     SEAT,
+    SEATED,
+    SITTING,
     SLIDE,
     UPRIGHT,
 )
+from marey.drawing.low_deeds import PICKS, POUNDS, REACHES, LowDeed
 from marey.generation.drawn_sides import drawn_side
 from marey.generation.kneeling import drops
 from marey.generation.posture import RowPosture
-from marey.generation.whole_body import ends_on_front, falls_on_front, is_low_crawl
-from marey.posing.standing import RIGHT
+from marey.generation.whole_body import (
+    ends_on_front,
+    falls_on_front,
+    half_turns,
+    is_low_crawl,
+    lies_and_rolls,
+    tumbles,
+)
+from marey.posing.standing import LEFT, RIGHT
+from marey.vocabulary.bearing_words import stated_bearings
+from marey.vocabulary.counts import stated_number
 from marey.vocabulary.peeks import only_peeks
 from marey.vocabulary.scope import STANDING
 
@@ -54,7 +71,7 @@ POSTURES: Mapping[str, str] = {
 THERE = frozenset({"sit", "lie", ""})
 """Actions that begin in their posture, in the first row."""
 RISING = frozenset({"get-up", "stand-up"})
-RISES_FROM: Mapping[str, frozenset[str]] = {"get-up": LYING, "stand-up": frozenset({SEAT})}
+RISES_FROM: Mapping[str, frozenset[str]] = {"get-up": LYING, "stand-up": SEATED}
 """Postures from which these rise by their definitions."""
 GESTURES = frozenset(
     {
@@ -74,8 +91,8 @@ ENTRIES: Mapping[str, str] = {"crawl": FOURS, "sit-ups": BACK, "push-ups": PLANK
 """Postures in which movements begin that are drawn by themselves."""
 LEAVES: Mapping[str, str] = {"push-ups": PLANK, "crawl": FOURS, "sit-ups": BACK}
 """Postures in which movements end that are drawn by themselves."""
-CREEPS = frozenset({"sneak"})
-"""Actions that begin crouched."""
+CREEPS = frozenset({"sneak", "run", "sprint"})
+"""Actions to which a body goes out of a crouch as it is, without standing up before."""
 _UP = re.compile(
     r"\b(?:gets?|stands?|rises?|scrambles?|jumps?|springs?|clambers?|struggles?|climbs?|leaps?|pushes|straightens?"
     r"|picks? (?:him|her|them|it)sel\w+)\b.*\b(?:up|upright|feet)\b|\brises?\b|^\W*stands?\W*$"
@@ -94,6 +111,20 @@ _BEING = re.compile(r"\b(?:sitting|seated|kneeling|crouch(?:ing|ed)|squatting|ly
 """Words of who is in a posture, not of who comes to it."""
 _ONE_KNEE = re.compile(r"\bone knee\b|\ba knee\b|\bpropos\w+|\bknight\w*|\brifle|\bgun\b|\baim\w*|\bpistol|\bbow\b")
 _BACK = re.compile(r"\b(?:back|supine|face[ -]?up)\b")
+_CROSSES = re.compile(
+    r"\b(?<!un)cross\w* (?:(?:his|her|their|its|the|both|one) )*(?:legs?|ankles?|knees?)\b|\b(?:legs|ankles) crossed\b"
+    r"|\bone leg (?:over|across)\b|\b(?:leg|knee) (?:over|across) (?:the other|his|her|their)\b"
+)
+_UNCROSSES = re.compile(r"\buncross\w*\b")
+"""Words of legs that are laid over each other on a seat, and of those that are put side by side again."""
+_ON_FLOOR = re.compile(r"\b(?:floor|ground|carpet|grass|sand|dirt|earth|feet)\b|\boff the rug\b")
+_TWO_HANDS = re.compile(
+    r"\bboth (?:hands|arms)\b|\b(?:heavy|big|large|huge)\b|\b(?:box|boxes|crates?|chest|barrel|child|baby|toddler|sack"
+    r"|buckets|stack|armful|papers|suitcases|bags)\b"
+)
+"""Words of what lies on the floor beside a seat, and of what is picked up with both hands."""
+_TURNS_OVER = re.compile(r"\b(?:roll|turn|flip|tumbl|spin)\w*\b")
+"""Words of a body that lies and turns over."""
 _GOES = re.compile(
     r"\b(?:walk|run|leave|exit|go|step|jump|march|dash|flee|rush|jog|climb|hop|danc|skip|move|turn|spin|kick|charg|escap"
     r"|return|approach|enter|crawl|roll|swim|fall|lie|kneel|crouch|squat)\w*\b"
@@ -137,7 +168,14 @@ def _held(row: Row, beside: tuple[Row | None, Row | None], begin: str) -> RowPos
         begin: name of the posture.
     """
     (action, said), (before, _) = row, beside
+    rolled = _rolled(row, begin)
+    if rolled is not None:
+        return rolled
     own = _posture(row, beside, begin)
+    deed = _deed(row, begin or own)
+    if deed is not None:
+        own = begin if begin in REACHES else KNEES
+        return RowPosture(begin, own, deed=deed)
     if own:
         crawled = own == PRONE and _crawls_low(before)
         there = crawled or (
@@ -150,7 +188,7 @@ def _held(row: Row, beside: tuple[Row | None, Row | None], begin: str) -> RowPos
             falls=not (begin or crawled) and (action == "die" or (own == KNEES and not there and drops(said))),
             fires=action == "shoot",
         )
-    leaves = FRONT if _crawls_low(row) else LEAVES.get(action, "")
+    leaves = FRONT if _crawls_low(row) else LEAVES.get(action, "") or _dives(said)
     if begin and not stays(row, begin) and action in ENTRIES:
         return RowPosture(enters=FRONT if _crawls_low(row) else ENTRIES[action], leaves=leaves)
     if leaves:
@@ -167,6 +205,12 @@ def _posture(row: Row, beside: tuple[Row | None, Row | None], begin: str) -> str
     (action, said), (before, after) = row, beside
     if not begin and _SLIDES.search(said) and action in ("", "get-up", "idle", "run"):
         return SLIDE
+    if begin in SEATED and (_CROSSES.search(said) or _UNCROSSES.search(said)):
+        return SEAT if _UNCROSSES.search(said) else CROSSED
+    if begin in SITTING and _CROSSES.search(said):
+        return FLOOR
+    if action in ("sit", "sit-down") and _CROSSES.search(said):
+        return CROSSED
     if action == "kneel":
         side = drawn_side(said, action)
         return RIGHT_KNEE if side == RIGHT else KNEE if side or _ONE_KNEE.search(said) else KNEES
@@ -194,6 +238,50 @@ def _posture(row: Row, beside: tuple[Row | None, Row | None], begin: str) -> str
     ):
         return BACK
     return POSTURES.get(action, "")
+
+
+def _rolled(row: Row, begin: str) -> RowPosture | None:
+    """Return the postures of a body that lies and rolls over; None if it does not.
+
+    Args:
+        row: action and words.
+        begin: name of the posture in which it is.
+    """
+    action, said = row
+    lies = begin in FLAT
+    turns = action in ("", "roll", "lie", "lie-down") and _TURNS_OVER.search(said) is not None
+    if not turns or tumbles(said) or not (lies or (action == "roll" and lies_and_rolls(said))):
+        return None
+    halves = half_turns(said)
+    named = re.search(r"\bto (?:the|his|her|their) (left|right)\b", said)
+    own = begin if begin in OPPOSITE else FRONT
+    if action in ("lie", "lie-down"):
+        own, halves = (FRONT if ends_on_front(said) else BACK), 0
+    elif lies and halves % 2:
+        own = OPPOSITE.get(begin, FRONT)
+    return RowPosture(begin, own, halves=halves, rolls_to=named[1] if named else "")
+
+
+def _deed(row: Row, begin: str) -> LowDeed | None:
+    """Return what the hands do low over the floor; None if nothing."""
+    action, said = row
+    pounds = next((each for each in stated_bearings(said) if each.name == "pound-ground"), None)
+    if pounds is not None and begin not in LYING | ON_HANDS:
+        return LowDeed(POUNDS, pounds.side, stated_number(pounds.words))
+    if action != "pick-up" or begin not in REACHES:
+        return None
+    hand = drawn_side(said, action) or (BOTH if _TWO_HANDS.search(said) else "")
+    return LowDeed(PICKS, hand, high=begin in SEATED and not _ON_FLOOR.search(said))
+
+
+def _dives(said: str) -> str:
+    """Return the posture in which a dive ends; empty if there is none."""
+    for each in stated_bearings(said):
+        if each.name == "side-dive":
+            return LEFT_SIDE if each.side == LEFT else RIGHT_SIDE
+        if each.name == "cover-dive":
+            return FRONT
+    return ""
 
 
 def _crawls_low(row: Row | None) -> bool:

@@ -119,7 +119,7 @@ STATED: Mapping[str, Statement] = {
     "cheer": _jumps_for_joy,
     "wave": _wave_overhead,
     "sit-floor": _cross_legged,
-    "kneel": drops_asked_for,
+    "kneel": lambda wish, rng, seconds: named_movement(wish, rng, seconds) or drops_asked_for(wish, rng, seconds),
     "dance": dance_asked_for,
     "sit": _leg_over(down=False),
     "sit-down": _leg_over(down=True),

@@ -18,6 +18,7 @@ from marey.drawing.cartwheels import cartwheel
 from marey.drawing.crawls import crawl, low_crawl
 from marey.drawing.falls import FORMS, die
 from marey.drawing.floor import get_up, lie, lie_down
+from marey.drawing.floor_ways import roll_over
 from marey.drawing.gesture import Gesture
 from marey.drawing.hops import jump_turned
 from marey.drawing.leaps import leap
@@ -85,6 +86,17 @@ _FROM = re.compile(
 """Words of where a blow comes from that a body falls away of."""
 _CROUCHES = re.compile(r"\b(?:crouch\w*|kneel\w*|knee|squat\w*|stays? low)\b")
 _SHOULDER = re.compile(r"\b(?:shoulder|combat|dodge|tactical|parkour|judo|evad\w*|evasive)\b")
+_OVER_ON_FLOOR = re.compile(
+    r"\broll(?:s|ing)? (?:\w+ly )?(?:over(?! (?:his|her|their|one|the|a|an|it)\b)|around|about|back and forth"
+    r"|(?:from )?side to side)\b"
+)
+_SOMERSAULT = re.compile(
+    r"\b(?:somersaults?|forwards?|shoulder|dives?|dodges?|backwards?|combat|tuck\w*"
+    r"|(?:to|onto) (?:his|her|their) (?:feet|knees?))\b"
+)
+"""Words of rolls that a body makes which lies on the floor, and of those over the head."""
+_HALVES: Mapping[str, int] = {"twice": 2, "two": 2, "three": 3, "thrice": 3, "four": 4, "several": 4, "around": 4}
+"""Half turns by the words of their number."""
 _IN_BED = re.compile(r"\b(?:bed|sleep\w*|asleep|lying|lies)\b")
 _ON_SIDE = re.compile(r"\b(?:(?:his|her|their|the|its|one|left|right) side|foetal|fetal|curl\w*|sideways)\b")
 _RISES = re.compile(
@@ -133,6 +145,8 @@ def _roll(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
     del seconds
     text = wish.prompt.lower()
     named = _SIDE_NAMED.search(text)
+    if lies_and_rolls(text):
+        return roll_over(rng, half_turns(text), named[1] if named else "")
     if _LOG.search(text) or (named and not _OVER_SHOULDER.search(text)):
         form = "sideways"
     elif re.search(r"\b(?:back|backwards?)\b", text):
@@ -142,6 +156,21 @@ def _roll(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
     again = (wish.count or 1) > 1
     low = not again and _CROUCHES.search(text) is not None
     return roll(rng, form, side=named[1] if named else "", stands=again, crouches=low)
+
+
+def lies_and_rolls(text: str) -> bool:
+    """Return True if a body rolls that lies on the floor, not over its head."""
+    return _OVER_ON_FLOOR.search(text) is not None and not tumbles(text)
+
+
+def tumbles(text: str) -> bool:
+    """Return True if words are those of a roll over the head, or onto the feet."""
+    return _SOMERSAULT.search(text) is not None
+
+
+def half_turns(text: str) -> int:
+    """Return how often a body that lies turns over, so far as its words say."""
+    return next((number for word, number in _HALVES.items() if re.search(rf"\b{word}\b", text)), 1)
 
 
 def _flip(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:

@@ -20,6 +20,7 @@ from marey.generation.port import Generator, Limits, Request
 from marey.generation.posture import NO_POSTURE
 from marey.generation.postured import gestures_s
 from marey.generation.row_postures import Row, rises, row_postures
+from marey.generation.shots.one_movement import joined_movements
 from marey.generation.shots.way_lengths import with_room_back
 from marey.generation.timed import TimedText, part_seed
 from marey.generation.wish import action_of
@@ -82,7 +83,8 @@ def as_timeline(generator: Generator[Any], request: Request) -> Request:
         InvalidInput: as `Limits.check`.
     """
     movements = _until_death(_merged_falls(request.text), request.text.said.lower())
-    movements = _leaping(movements) if draws(generator, request) else movements
+    if draws(generator, request):
+        movements = joined_movements(_leaping(movements), request.seed)
     alone = not (request.kept or request.free or request.recording or request.timeline)
     if not movements and alone and request.frames is None:
         request = replace(request, frames=_only_frames(generator.limits, request.text.said))

@@ -95,10 +95,11 @@ class RowStrand(Strand):
     @property
     def is_trimmed(self) -> bool:
         """True if its rest may be left out: its features show the movement, no gesture is drawn on it later."""
-        waits = action_of(self.text) in ("", STANDING) or any(
-            each.bearing.gesture for each in stated_bearings(self.text.said)
-        )
-        return self.is_drawn and not (waits or self.held.is_drawn)
+        stated = stated_bearings(self.text.said)
+        moves = any(each.bearing.moves for each in stated)  # it is drawn whole, and nothing on it
+        waits = not moves and (action_of(self.text) in ("", STANDING) or any(each.bearing.gesture for each in stated))
+        is_low = self.held.is_drawn and bool(self.held.begin)  # it has no rest before it goes down
+        return self.is_drawn and not (waits or is_low)
 
     def as_way(self, layout: FeatureLayout) -> WayRow:
         """Return what the row is for the lengths of ways."""
