@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from marey.quality.record import Flag, MotionQuality
 from marey.vocabulary.bearing_words import stated_bearings
+from marey.vocabulary.drops import stated_drop
 from marey.vocabulary.entries import FLIGHT_SECONDS, Support, load_vocabulary
 from marey.vocabulary.scope import every_action, match_scope
 from marey.vocabulary.take_names import as_words
@@ -66,6 +67,8 @@ def expected_by_prompts(prompts: Iterable[str]) -> Expected:
     prompts = tuple(prompts)
     named = (action.action for prompt in prompts for action in match_scope(prompt, every_action()).actions)
     expected = expected_of(name for name in named if name is not None)
+    if any(stated_drop(as_words(prompt)) for prompt in prompts):
+        expected = Expected((*expected.supports, "raised"), expected.flight_s)
     if not any(each.bearing.moves for prompt in prompts for each in stated_bearings(as_words(prompt))):
         return expected
     supports = tuple(dict.fromkeys((*expected.supports, *MOVED.supports)))

@@ -40,6 +40,7 @@ from marey.text.readings import ReadPrompt, TrainedReaders
 from marey.text.rewriters import NotRewritten, PromptRewriter, Rewrite
 from marey.text.roles import RoleLabeller
 from marey.text.sequence_reader import ReadMovement
+from marey.text.stunt_words import with_plain_stunts
 from marey.text.time_order import in_time_order
 from marey.text.winding_ways import with_plain_zigzag
 from marey.text.word_order import in_usual_order
@@ -58,7 +59,7 @@ TOGETHER = 64
 def _in_known_words(prompt: str) -> str:
     """Return a prompt as the readers know it: in the order of time, with the words that it leaves out, without those
     that mislead them, and with plain words of ways that wind and of gaits in place."""
-    said = with_known_verbs(with_plain_phrases(without_asides(as_words(prompt))))
+    said = with_known_verbs(with_plain_phrases(with_plain_stunts(without_asides(as_words(prompt)))))
     ordered = with_elided(in_time_order(in_usual_order(said)))
     return without_misleading(with_plain_gait_in_place(with_plain_zigzag(ordered)))
 

@@ -26,6 +26,7 @@ from marey.vocabulary.hurt_legs import hurt_leg
 from marey.vocabulary.inflection import verb_forms
 from marey.vocabulary.lengths import verb_forms as verb_forms_known
 from marey.vocabulary.meanwhile import AT_ONCE, JOINS_AHEAD, WAYS, is_on_a_way, spans_at_once
+from marey.vocabulary.sheaths import drawing_hand
 from marey.vocabulary.word_lists import load_word_lists
 
 KEPT_READINGS = 1024
@@ -557,4 +558,4 @@ def _side(words: str) -> Side:
     side = _SIDE.search(words)
     if side is None:
         return ""
-    return "left" if side[1] == "left" else "right"
+    return drawing_hand(words) or ("left" if side[1] == "left" else "right")

@@ -41,15 +41,15 @@ def test_several_actions_have_no_percentile_and_unknown_ones_no_value() -> None:
 
 
 def test_the_action_that_the_encoder_reads_is_matched_where_words_name_none() -> None:
-    clip, prompt = clip_of(walker()), ["moseys along"]
-    scope = Scope((NamedAction("moseys along", "tried", "walk"),), by="encoder")
+    clip, prompt = clip_of(walker()), ["skedaddles along"]
+    scope = Scope((NamedAction("skedaddles along", "tried", "walk"),), by="encoder")
     assert match_of(clip, prompt) == PromptMatch()
     assert match_of(clip, prompt, scope.as_json()) == match_of(clip, ["a person walks"])
     assert match_of(clip, ["he bows"], scope.as_json()) == match_of(clip, ["he bows"])  # words decide
     for unread in (
         replace(scope, by="words"),
         replace(scope, flags=("negation",)),
-        replace(scope, actions=(NamedAction("moseys along", "unknown"),)),
+        replace(scope, actions=(NamedAction("skedaddles along", "unknown"),)),
         replace(scope, actions=(NamedAction("does laundry", "tried", "launder"),)),
         replace(scope, actions=scope.actions * 2),
     ):

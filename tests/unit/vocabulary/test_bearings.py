@@ -141,7 +141,7 @@ def test_numbers_of_strokes_are_read_with_what_they_count(prompt: str, left: str
         ("a person stands with arms crossed", "a person stands", ["arms-crossed"]),
         ("a man crosses his arms and whistles", "a man whistles", ["arms-crossed"]),
         ("a man crosses his arms and taps his foot", "", ["arms-crossed", "foot-tap"]),
-        ("a lumberjack chops wood in the forest", "a lumberjack in the forest", ["chopping"]),
+        ("a lumberjack chops wood in the forest", "", ["chopping"]),
         ("a girl skips along the path", "a girl walks along the path", ["skipping"]),
         ("a soldier marches with high knees", "a soldier marches", ["high-knees"]),
         ("she knocks three times on the wooden door", "", ["knock"]),

@@ -24,6 +24,10 @@ from marey.vocabulary.counts import stated_count
         ("throws three jabs", "jab jab jab"),
         ("hooks", "hook"),
         ("uppercut right", "right-uppercut"),
+        ("uppercut, right, heavy", "right-uppercut"),
+        ("three quick jabs with the left, then one big right hook", "left-jab left-jab left-jab right-hook"),
+        ("one left jab, then two right hooks", "left-jab right-hook right-hook"),
+        ("left jab, right", "left-jab right"),
         ("jab left, cross right", "left-jab right-cross"),
         ("throws a punch to the left", ""),
         ("sits cross-legged", ""),
@@ -38,3 +42,9 @@ def test_a_list_of_punches_is_their_number() -> None:
     assert stated_count("one-two combo", "punch") == 2
     assert stated_count("throws a jab three times", "punch") == 3
     assert stated_count("throws a hook", "punch") is None
+
+
+def test_punches_have_the_weight_of_their_own_words() -> None:
+    assert [each.weight for each in stated_blows("two light jabs and a heavy hook")] == ["light", "light", "heavy"]
+    assert [each.weight for each in stated_blows("uppercut, right, heavy")] == ["heavy"]
+    assert [each.weight for each in stated_blows("right hook")] == [""]

@@ -27,6 +27,8 @@ _FAR = 0.95
 """Metres of a jump that is called long."""
 _QUICK_DIP, _QUICK_CROUCH_S, _QUICK_RISE_S = 0.08, 0.2, 0.12
 """Metres by which the hips go down before a quick jump, and seconds of that and of leaving the floor."""
+_CROUCHED_M = 0.5
+"""Metres of the hips in a crouch."""
 _FEET, _OFF = [7, 8, 10, 11], 0.02
 """Joints of the feet, and metres by which all are higher than at first in a flight."""
 _FREE = {
@@ -174,9 +176,10 @@ def _jump(rng: random.Random, ahead: float, times: int | None) -> Gesture:
     return replace(jumps(rng, kinds, rng.uniform(0.15, 0.8), flight, times, ahead=ahead, tuck=tuck), untrue=untrue)
 
 
-def jump_aside(rng: random.Random, flight: float, times: int, metres: float) -> Gesture:
-    """Quick jumps of both feet to the left, by so many metres each; less than 0 = to the right."""
-    gesture = jumps(rng, ["jump-aside"], rng.uniform(0.55, 0.8), flight, times, quick=True)
+def jump_aside(rng: random.Random, flight: float, times: int, metres: float, *, low: bool = False) -> Gesture:
+    """Quick jumps of both feet to the left, by so many metres each; less than 0 = to the right. `low`: as in
+    `jumps`."""
+    gesture = jumps(rng, ["jump-aside"], rng.uniform(0.55, 0.8), flight, times, quick=True, low=low)
     return replace(_moving(gesture, metres, 0.0), side=LEFT if metres > 0 else RIGHT)
 
 
@@ -244,6 +247,7 @@ def jumps(
     ahead: float = 0.0,
     tuck: float = 0.0,
     quick: bool = False,
+    low: bool = False,
 ) -> Gesture:
     """Jumps of both feet.
 
@@ -256,8 +260,9 @@ def jumps(
         ahead: metres of each; less than 0 = back.
         tuck: metres by which the feet are drawn up.
         quick: at once, without a swing of the arms.
+        low: the last one ends in a crouch.
     """
-    drawn = _Jumps(rng, starts, flight, times, ahead=ahead, tuck=tuck)
+    drawn = _Jumps(rng, starts, flight, times, ahead=ahead, tuck=tuck, low=low)
     if quick:
         drawn.hurry()
     return on_feet(drawn.sequel, kinds, drawn.after, times=times)
@@ -272,11 +277,13 @@ class _Jumps:
         crouch, rise, absorb, straighten, after: seconds of going down, of leaving the floor, of landing, of standing
             up, and of standing after it.
         gaze: degrees of the neck.
+        low: they end in a crouch.
     """
 
     def __init__(
-        self, rng: random.Random, starts: float, flight: float, times: int, *, ahead: float, tuck: float
+        self, rng: random.Random, starts: float, flight: float, times: int, *, ahead: float, tuck: float, low: bool
     ) -> None:
+        self.low = low
         self.starts, self.flight, self.times, self.ahead, self.tuck = starts, flight, times, ahead, tuck
         self.dip = 0.1 + 0.75 * (flight - 0.3) + rng.uniform(0.0, 0.06)
         self.land = 0.12 + 0.5 * (flight - 0.3) + rng.uniform(0.0, 0.05)
@@ -301,6 +308,10 @@ class _Jumps:
             flat, land = _flat(feet, there), self.land
             touch = self._at(0.915 - 0.35 * land, there - 0.1 * self.ahead, flat, _SWUNG["bent"], 40 * land, 20 * land)
             done.then(0.07, touch)
+            if k == self.times - 1 and self.low:
+                crouch = self._at(_CROUCHED_M, there - 0.06, flat, _SWUNG["bent"], 34, 22)
+                done.then(1.4 * self.absorb, crouch, 0.7)
+                return done
             if k < self.times - 1:
                 done.then(self.absorb, self._crouched(there, flat, 0.6))
             else:

@@ -22,6 +22,8 @@ OUT_S, HOLD_S, BACK_S = 0.26, (0.2, 0.45), 0.55
 """Seconds in which a body gets out of the way, stays there, and comes back."""
 FIRST_S, PAUSE_S = (0.5, 0.9), (0.7, 1.3)
 """Seconds before the first dodge, and between two."""
+EARLIEST_S, LEAST_S = 0.1, 0.5
+"""Seconds before the first of several dodges, and between the starts of two, at least."""
 _DUCKS = re.compile(r"\b(?:ducks?|ducking|ducked|crouch\w*|under|below)\b")
 _BACK = re.compile(r"\b(?:back|backwards?|away from)\b")
 _SPRINGS = re.compile(r"\b(?:hop|jump|leap|spr[iau]ng|dash|div|roll|step|skip|run|rush|scurr)")
@@ -79,12 +81,23 @@ def dodged(joints: Array, fps: float, wish: FineWish, rng: np.random.Generator) 
 
 
 def _ways(seconds: float, count: int | None, rng: np.random.Generator) -> Iterator[tuple[float, float]]:
-    """Yield the start of each dodge, and for how long it is held."""
-    at, number = float(rng.uniform(*FIRST_S)), 0
-    while count is None or number < count:
+    """Yield the start of each dodge, and for how long it is held; a stated number has less time between two if there is
+    no more."""
+    at, found = float(rng.uniform(*FIRST_S)), list[tuple[float, float]]()
+    while count is None or len(found) < count:
         hold = float(rng.uniform(*HOLD_S))
         ends = at + OUT_S + hold + BACK_S
         if ends > seconds + 0.1:
+            yield from _hurried(seconds, count) if count is not None and count > 1 else found
             return
-        yield at, hold
-        at, number = ends + float(rng.uniform(*PAUSE_S)), number + 1
+        found.append((at, hold))
+        at = ends + float(rng.uniform(*PAUSE_S))
+    yield from found
+
+
+def _hurried(seconds: float, count: int) -> Iterator[tuple[float, float]]:
+    """Yield as many dodges as there is time for, up to `count`, one out of the other."""
+    last = seconds - OUT_S - HOLD_S[0] - BACK_S
+    fits = min(count, int((last - EARLIEST_S) / LEAST_S) + 1) if last >= EARLIEST_S else 0
+    for number in range(fits):
+        yield EARLIEST_S + number * (last - EARLIEST_S) / max(fits - 1, 1), HOLD_S[0]

@@ -41,7 +41,10 @@ _TRAVELS = re.compile(
     r"\b(?P<way>back(?:wards?)?|forwards?|sideways|to (?:the|his|her|their) (?P<side>left|right))\b"
 )
 """Words of steps that a blow makes a body take, and their way."""
-_SOME_STEPS = re.compile(r"\b(?:a few|some|several|a couple of) (?:\w+ )?(?:steps|paces)\b")
+_SOME_STEPS = re.compile(
+    r"\b(?:a few|some|several|a couple of) (?:\w+ )?(?:steps|paces)\b"
+    r"|\b(?:stagger|stumbl|reel|lurch)\w* back(?:wards?)? (?:after|from|when|as|because)\b"
+)
 MOST_STEPS, FEW_STEPS = 8, 3
 
 

@@ -22,6 +22,10 @@ _ONE = re.compile(
     r"|\bside[ -]?step(?:s|ped)?\b(?= (?:\w+ly )?(?:once|to (?:the|his|her) (?:left|right)|left|right)\W*$|\W*$)"
 )
 """Words of a single step."""
+_ALONG_LEDGE = re.compile(
+    r"\b(?:shimm|inch|sidl|edg(?:e|es|ing) )\w*|\balong (?:\w+ ){0,3}(?:ledge|cliff|edge|sill|parapet)\b"
+)
+"""Words of careful steps where there is little room."""
 _STEPS = re.compile(
     r"\b(?:keeps?|repeatedly|again and again|over and over|continu\w*|around|steps of|many|several|few)\b"
 )
@@ -46,6 +50,8 @@ def steps_aside(wish: FineWish, rng: random.Random, seconds: float | None) -> Ge
     text, pace = wish.prompt.lower(), stated_pace(wish.prompt)
     if _TO_AND_FRO.search(text):
         return None
+    if not pace and _ALONG_LEDGE.search(text):
+        pace = "slow"
     ahead = _ahead(text)
     count = stated_count(wish.prompt, "sidestep") or stated_things(text, _THINGS)
     if count is None and not wish.fixed and _ONE.search(text) and not _STEPS.search(text):

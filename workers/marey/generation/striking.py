@@ -11,7 +11,7 @@ from __future__ import annotations
 import random
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,8 @@ GUARD: Mapping[str, Point] = {LEFT: (0.06, -0.02, 0.22), RIGHT: (0.08, -0.05, 0.
 ELBOW = (0.45, -1.0, -0.1)
 FIRST_S, LAST_S = 0.5, 0.35
 """Seconds in guard before the first strike and after the last one, at least."""
+SOON_S = 0.15, 0.3
+"""Seconds before the first strike behind another movement."""
 PAUSE_S, BETWEEN_S = (0.7, 1.2), (0.02, 0.12)
 """Seconds between rows of strikes, and between the strikes of a row, where no number is asked for."""
 ROW = (2, 3)
@@ -50,6 +52,8 @@ class _Strike:
         way: places of the wrist at these times, as `GUARD`, between the first and the last, which are the guard's.
         twist: degrees of the trunk at these times, to the other side.
         elbow: where it points meanwhile.
+        hips: share of the twist that the hips have, on feet that pivot with them.
+        sink: metres by which the hips go down at these times; empty = as far as the trunk turns.
     """
 
     times: tuple[float, ...]
@@ -57,7 +61,18 @@ class _Strike:
     twist: tuple[float, ...]
     elbow: Point = ELBOW
     hips: float = 0.0
-    """Share of the twist that the hips have, on feet that pivot with them."""
+    sink: tuple[float, ...] = ()
+
+    def weighted(self, weight: str) -> _Strike:
+        """Return a heavy or a light one: the body loads longer or shorter, and turns and sinks more or less."""
+        if weight not in _WEIGHTS or not self.hips:
+            return self
+        load, body, returns = _WEIGHTS[weight]
+        loaded = self.times[1]
+        steps = [load * loaded, *(load * loaded + each - loaded for each in self.times[2:-1])]
+        end = steps[-1] + returns * (self.times[-1] - self.times[-2])
+        twist, sink = (tuple(body * each for each in values) for values in (self.twist, self.sink))
+        return replace(self, times=(0.0, *steps, end), twist=twist, sink=sink)
 
     @property
     def seconds(self) -> float:
@@ -65,19 +80,24 @@ class _Strike:
         return self.times[-1]
 
 
+_WEIGHTS: Mapping[str, tuple[float, float, float]] = {"heavy": (1.7, 1.12, 1.35), "light": (0.75, 0.7, 0.8)}
+"""Of a heavy and a light blow: factors of the seconds in which the body loads, of what it does, and of the return."""
 _STRAIGHT = _Strike((0.0, 0.12, 0.19, 0.44), ((-0.02, 0.0, 0.66), (-0.02, 0.0, 0.66)), (0.0, 24.0, 24.0, 0.0))
 _HOOK = _Strike(
     (0.0, 0.22, 0.31, 0.37, 0.45, 0.8),
-    ((0.34, -0.04, 0.0), (0.46, 0.14, 0.28), (0.06, 0.18, 0.53), (-0.16, 0.14, 0.38)),
-    (0.0, -30.0, 4.0, 52.0, 62.0, 0.0),
+    ((0.30, -0.04, 0.02), (0.46, 0.14, 0.28), (0.04, 0.16, 0.48), (-0.22, 0.14, 0.34)),
+    (0.0, -14.0, 4.0, 52.0, 62.0, 0.0),
     (1.0, 0.35, -0.2),
     0.45,
+    (0.0, 0.05, 0.03, 0.01, 0.0, 0.0),
 )
 _UPPERCUT = _Strike(
-    (0.0, 0.24, 0.4, 0.5, 0.8),
-    ((0.18, -0.26, 0.12), (-0.05, 0.10, 0.50), (-0.06, 0.14, 0.48)),
-    (0.0, -14.0, 26.0, 28.0, 0.0),
+    (0.0, 0.26, 0.38, 0.47, 0.56, 0.92),
+    ((0.16, -0.36, 0.06), (0.06, -0.24, 0.26), (0.02, 0.08, 0.43), (0.0, 0.20, 0.37)),
+    (0.0, -28.0, -6.0, 38.0, 44.0, 0.0),
     (0.3, -1.0, -0.2),
+    0.5,
+    (0.0, 0.10, 0.07, -0.015, -0.02, 0.0),
 )
 _KINDS: Mapping[str, tuple[_Strike, str]] = {
     "hook": (_HOOK, ""),
@@ -103,7 +123,9 @@ _ONE = re.compile(
     r"\b(?:a|an|one|single)\b(?: [\w-]+){0,3} (?:punch|jab|hook|uppercut|cross|blow)\b(?! (?:combo|combination))"
     r"|^(?:(?:left|right|lead|rear)[ -](?:hand )?)?(?:jab|hook|uppercut|cross|haymaker|punch)\b"
 )
-"""Words of a single punch."""
+_NAMED_ONCE = re.compile(r"\b(?:hook|uppercut|jab|cross|haymaker)\b")
+_GOES_ON = re.compile(r"\b(?:practi[sc]|train|work|drill|repeat|again|combo|series|flurry|bag)\w*")
+"""Words of a single punch, and of blows that go on and on."""
 
 
 def punched(joints: Array, fps: float, wish: FineWish, rng: np.random.Generator) -> Array | None:
@@ -113,7 +135,7 @@ def punched(joints: Array, fps: float, wish: FineWish, rng: np.random.Generator)
     on_spot = stands(wish)
     own_end = on_spot and count is not None and not wish.fixed
     seconds = None if own_end else len(joints) / fps
-    strikes = list(_timed(seconds, kinds, count, rng))
+    strikes = list(_timed(seconds, kinds, count, rng, at_once=bool(wish.beside[0])))
     if not strikes:
         return None
     if on_spot:
@@ -134,6 +156,7 @@ def _struck(body: StandingBody, fps: float, strikes: list[tuple[float, _Strike, 
     """Draw the guard and the strikes; the hips go ahead with these if it `drives` them."""
     frames = len(body.joints)
     time, twist, hips = np.arange(frames) / fps, np.zeros(frames), np.zeros(frames)
+    sinks = np.zeros(frames)
     pivots = {side: np.zeros(frames) for side in ARMS}
     ways = {side: np.tile(GUARD[side], (frames, 1)) for side in ARMS}
     elbows = {side: np.tile(ELBOW, (frames, 1)) for side in ARMS}
@@ -146,12 +169,14 @@ def _struck(body: StandingBody, fps: float, strikes: list[tuple[float, _Strike, 
         twist[inside] -= SIGN[side] * turned
         hips[inside] -= SIGN[side] * strike.hips * turned
         pivots[side][inside] += strike.hips * np.maximum(turned, 0.0)
+        if strike.sink:
+            sinks[inside] += way_through(since, strike.times, strike.sink)
         lifted = eased(np.minimum(since, strike.seconds - since) / 0.12)[:, None]
         elbows[side][inside] = (1 - lifted) * np.array(ELBOW) + lifted * np.array(strike.elbow)
     twist = smooth(twist, SMOOTH_S, fps)
     if drives:
         ahead = smooth(np.abs(twist) / 36.0, 0.05, fps)
-        body.shift(-0.3 * STRIDE_M * ahead, STRIDE_M * ahead)
+        body.shift(-0.3 * STRIDE_M * ahead - smooth(sinks, SMOOTH_S, fps), STRIDE_M * ahead)
         hips = smooth(hips, SMOOTH_S, fps)
         turn_hips(body, hips)
         for side in ARMS:
@@ -180,10 +205,20 @@ def _in_stance(frames: int, rng: random.Random) -> StandingBody:
 
 
 def _timed(
-    seconds: float | None, kinds: list[tuple[_Strike, str]], count: int | None, rng: np.random.Generator
+    seconds: float | None,
+    kinds: list[tuple[_Strike, str]],
+    count: int | None,
+    rng: np.random.Generator,
+    *,
+    at_once: bool = False,
 ) -> Iterator[tuple[float, _Strike, str]]:
-    """Yield start, way and hand of each strike, as many as there is time for; without `seconds`, for all of `count`."""
-    at, number, row = FIRST_S + float(rng.uniform(0.0, 0.4)), 0, int(rng.integers(*ROW, endpoint=True))
+    """Yield start, way and hand of each strike, as many as there is time for; without `seconds`, for all of `count`;
+    `at_once`: soon, out of another movement."""
+    at, number, row = (
+        float(rng.uniform(*SOON_S)) if at_once else FIRST_S + float(rng.uniform(0.0, 0.4)),
+        0,
+        int(rng.integers(*ROW, endpoint=True)),
+    )
     if count is not None and seconds is not None:
         taken = sum(kinds[k % len(kinds)][0].seconds + BETWEEN_S[1] for k in range(count))
         at = max(0.15, min(at, (seconds - taken) / 2))
@@ -205,8 +240,10 @@ def _row(wish: FineWish, rng: np.random.Generator) -> tuple[list[tuple[_Strike, 
     for each in blows:
         strike, usual = _KINDS[each.kind]
         last = each.side or side or usual or OTHER_SIDE[last]
-        found.append((strike, last))
+        found.append((strike.weighted(each.weight), last))
     if len(found) > 1:
         return found, len(found)
-    count = wish.count or (1 if _ONE.search(wish.prompt.lower()) else None)
+    text = wish.prompt.lower()
+    once = _ONE.search(text) or (len(found) == 1 and _NAMED_ONCE.search(text) and not _GOES_ON.search(text))
+    count = wish.count or (1 if once else None)
     return found or [(_STRAIGHT, each) for each in ([wish.side] if wish.side else [LEFT, RIGHT])], count

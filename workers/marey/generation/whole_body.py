@@ -24,6 +24,7 @@ from marey.drawing.hops import jump_turned
 from marey.drawing.leaps import leap
 from marey.drawing.rolls import flip, roll
 from marey.drawing.slips import slip
+from marey.drawing.stunts import blown_back, climb_over_edge, dodge_roll
 from marey.drawing.swims import swim
 from marey.drawing.vaults import vault
 from marey.generation.fine_wish import FineWish
@@ -80,6 +81,14 @@ _SLOWLY = re.compile(r"\b(?:slow\w*|gradual\w*|sinks?|slump\w*|crumples?)\b")
 _LOG = re.compile(r"\b(?:side|sideways|log|barrel|pencil|over onto|lateral\w*)\b")
 _SIDE_NAMED = re.compile(r"\b(left|right)\b")
 _OVER_SHOULDER = re.compile(r"\b(?:left|right) shoulder\b")
+_BLAST = re.compile(r"\b(?:explo\w+|blasts?|bombs?|grenades?|shock ?waves?|detonat\w+)\b")
+_DODGES = re.compile(r"\b(?:dodg\w*|evad\w*|evasive|combat|tactical|roll(?:s|ing)? out of the way|escape)\b")
+_EDGE = re.compile(
+    r"\b(?:pull|haul|hoist|heav|climb|clamber|scrambl|mantl)\w*(?: (?:him|her|it|them)sel(?:f|ves))?(?: \w+ly)? "
+    r"(?:up )?(?:and )?(?:over|onto|up to|on)(?: to)? (?:\w+ ){0,3}?"
+    r"(?:edge|ledge|roof|rooftop|cliff|rim|lip|balcony|parapet|brink|platform)s?\b"
+)
+"""Words of a way up over an edge higher than the head."""
 _FROM = re.compile(
     r"\bfrom (?:the |his |her |its |their )?(?:(front|ahead)|(back|behind|rear)|(left|right))\b(?! foot| leg| hand)"
 )
@@ -117,6 +126,8 @@ _ONTO_FRONT = re.compile(r"\b(?:face[ -]?down|stomach|belly|front|prone|tummy|ch
 def _fall(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
     del seconds
     text = _FROM.sub(_away, wish.prompt.lower())
+    if _BLAST.search(text):
+        return blown_back(rng)
     if _SLIPS.search(text) and not (_FRONT.search(text) or _SIDE.search(text)):
         return slip(rng, "sit" if _ON_SEAT.search(text) else "back")
     knees, aside = bool(_KNEES.search(text)), bool(_SIDE.search(text))
@@ -147,6 +158,10 @@ def _roll(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
     named = _SIDE_NAMED.search(text)
     if lies_and_rolls(text):
         return roll_over(rng, half_turns(text), named[1] if named else "")
+    quick = _DODGES.search(text) is not None and not re.search(r"\bback(?:wards?)?\b|\blog\b|\bshoulder\b", text)
+    if quick and (wish.count or 1) == 1:
+        side = named[1] if named else wish.side
+        return dodge_roll(rng, side, ahead=not side, low=_CROUCHES.search(text) is not None)
     if _LOG.search(text) or (named and not _OVER_SHOULDER.search(text)):
         form = "sideways"
     elif re.search(r"\b(?:back|backwards?)\b", text):
@@ -200,6 +215,8 @@ def _leap(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
 def _vault(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
     del seconds
     text = wish.prompt.lower()
+    if not _VAULTS.search(text):
+        return climb_over_edge(rng)
     high = rng.uniform(0.74, 0.8) if _LOW_VAULT.search(text) else 0.0
     named = _LEGS_SIDE.search(text)
     return vault(rng, (named[1] or named[2]) if named else "", high)
@@ -332,13 +349,14 @@ def is_drawn(action: str) -> Callable[[FineWish], bool]:
 
 def goes_out_of_a_run(action: str, wish: FineWish) -> bool:
     """Return True if a movement is drawn only where a network does not show it, since that keeps the speed of a run."""
-    return action in OUT_OF_A_RUN and any(wish.beside)
+    return action in OUT_OF_A_RUN and bool(wish.beside[0])
 
 
 def _is_networks(action: str, wish: FineWish) -> bool:
     if action == "climb-onto":
         text = wish.prompt.lower()
-        return not _VAULTS.search(text) or _POLE.search(text) is not None
+        ends_up = _EDGE.search(text) and not any(wish.beside)  # other movements begin and end on one floor
+        return not (_VAULTS.search(text) or ends_up) or _POLE.search(text) is not None
     others = LEFT_TO_NETWORKS.get(action)
     return others is not None and others.search(wish.prompt.lower()) is not None
 

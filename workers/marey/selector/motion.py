@@ -40,6 +40,8 @@ UP = -0.28
 CHEST = HUMANML3D.index("spine3")
 OFF_FLOOR = 0.04
 """Metres over its standing height from which a foot is off the floor."""
+HIGH_UP = 0.3
+"""Metres over the floor from which feet at the beginning of a motion stand on something."""
 
 _REST = HUMANML3D.rest.astype(np.float64) * STATURE / stature(HUMANML3D)
 _LEG = float(np.linalg.norm(_REST[1] - _REST[4]) + np.linalg.norm(_REST[4] - _REST[7]))
@@ -289,6 +291,8 @@ class Motion:
         feet, found = self.feet, list[AirPhase]()
         near = max(round(0.1 * self.fps), 1)
         for a, b in runs(feet.min(axis=1) > OFF_FLOOR):
+            if a == 0 and feet[0].min() > HIGH_UP:  # it stands on something high, and jumps down
+                a = _last(np.abs(feet[:b] - feet[0]).max(axis=1) < OFF_FLOOR) + 1
             if a and b < len(feet) and b - a >= 0.08 * self.fps:
                 left, right = (_last(feet[:a, k] < OFF_FLOOR) for k in (0, 1))
                 found.append(
