@@ -49,7 +49,7 @@ Mesh = Annotated[
     bool, typer.Option("--mesh", help="Add a neutral body to glb, fbx and usd files, for viewers that show no bones.")
 ]
 RIG_HELP = (
-    "Put the motion on a rig: mixamo, ue4, humanik, or a character's file (.glb, .vrm, .fbx, .bvh, .json, .npz of"
+    "Put the motion on a rig: mixamo, ue4, humanik, or a character's file (.glb, .vrm, .fbx, .usd, .bvh, .json, .npz of"
     " SMPL-X){more}; acts on BVH, glb, FBX and USD. `marey rigs show` tells what is found in it."
 )
 BODY_HELP = (

@@ -65,7 +65,7 @@ def name_options(error: MareyError, given: Mapping[str, str] = NO_OPTIONS, words
     option = given.get(argument) or OPTIONS[argument]
     if error.where == argument:
         error.where = option
-    if error.hint is not None:
+    if error.hint is not None and option not in error.hint:
         error.hint = re.sub(rf"pass {argument}=True|\b{argument}\b", lambda found: _named(found, option), error.hint)
     return error
 

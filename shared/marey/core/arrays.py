@@ -4,6 +4,7 @@ numbers are checked, and every fault is an error of `marey.core.errors`."""
 from __future__ import annotations
 
 import io
+import sys
 import zipfile
 from collections.abc import Collection
 from pathlib import Path
@@ -51,9 +52,17 @@ def check_array(
     if array.ndim != len(shape) or any(s is not None and s != n for s, n in zip(shape, array.shape, strict=True)):
         wanted = "(" + ", ".join("any" if s is None else str(s) for s in shape) + ")"
         raise InvalidFile(f"`{name}` has shape {array.shape}, not {wanted}", where=where, hint=hint)
+    if array.dtype.kind == "U" and not _is_text(array):
+        raise InvalidFile(f"`{name}` holds text that is not Unicode", where=where, hint=hint)
     if finite and array.dtype.kind in "fc" and not _is_finite(array):
         raise InvalidFile(f"`{name}` holds NaN or infinite numbers", where=where, hint=hint)
     return array
+
+
+def _is_text(array: Array) -> bool:
+    """Return True if all characters are some: numpy keeps any number, of which Python makes no text."""
+    codes = np.frombuffer(array.tobytes(), f"{array.dtype.byteorder.replace('=', '').replace('|', '')}u4")
+    return bool((codes <= sys.maxunicode).all())
 
 
 def map_npy(path: Path, *, hint: str | None = None) -> Array:

@@ -10,7 +10,7 @@ from marey.exporters.exporter import Coordinates, Exporter
 from marey.exporters.registry import check_writers, exporter_for
 from marey.motion.clip import MAX_UNPACKED, MotionClip
 from marey.motion.export_options import PLAIN, ExportOptions, RestPose
-from marey.motion.files import read_limited, write_atomically
+from marey.motion.files import check_folder_of, read_limited, write_atomically
 from marey.motion.io.bvh import BvhClip
 from marey.motion.io.convert import clip_from_bvh, resample_bvh
 from marey.motion.resample import resample
@@ -45,8 +45,8 @@ def convert(
 
     Raises:
         MissingExtra: an extra that writes the format of the result is not installed.
-        InvalidInput: a format that is unknown or write-only, a rate out of bounds, an option that the format of the
-            result does not have, or a skeleton without that rest pose.
+        InvalidInput: a target without a folder, a format that is unknown or write-only, a rate out of bounds, an option
+            that the format of the result does not have, or a skeleton without that rest pose.
         Conflict: the target exists.
         NotFound, InvalidFile, TooLarge: from reading.
     """
@@ -55,6 +55,7 @@ def convert(
     check_writers([writer], export)
     if target.exists() and not overwrite:
         raise Conflict("already exists", where=str(target), hint="Choose another name, or allow overwriting.")
+    check_folder_of(target)
     clip = _decode(reader, source, Coordinates(source_unit, source_up, rest_pose=source_rest_pose))
     notes: tuple[str, ...] = ()
     if isinstance(clip, BvhClip):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import secrets
 import stat
@@ -42,6 +43,20 @@ def read_limited(path: Path, limit: int) -> bytes:
         raise NotFound("no such file", where=str(path)) from None
     except OSError as error:
         raise InvalidFile(f"cannot be read: {error.strerror}", where=str(path)) from None
+
+
+def check_folder_of(path: Path) -> None:
+    """Check that a file can get this name, before what it holds is made.
+
+    Raises:
+        InvalidInput: its folder is missing or cannot be written to.
+    """
+    folder = path.parent
+    fault = errno.ENOTDIR if folder.exists() and not folder.is_dir() else errno.ENOENT if not folder.exists() else None
+    if fault is None and not os.access(folder, os.W_OK | os.X_OK):
+        fault = errno.EACCES
+    if fault is not None:
+        raise InvalidInput(f"cannot be written: {os.strerror(fault)}", where=str(path))
 
 
 def write_atomically(path: Path, data: bytes) -> None:

@@ -205,7 +205,7 @@ def test_a_process_that_takes_too_long_or_dies_is_replaced(monkeypatch: pytest.M
     assert late.message == "the file takes longer than 1 s to make"
     assert not short.alive
     short.close()
-    small = MakingProcess(memory=2**26)
+    small = MakingProcess(memory=2**24)
     assert isinstance(small.make(FileRecipe("glb"), NPZ, "motion"), FailureReason)
     small.close()
 

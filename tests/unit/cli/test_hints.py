@@ -23,6 +23,8 @@ def test_an_error_names_the_option_in_place_of_the_argument() -> None:
     assert str(error) == "walk.npz: already exists\n  Choose another folder, or use --overwrite."
     error = name_options(InvalidInput("-1 is outside 0 to 9", where="seed", argument="seed"))
     assert str(error) == "--seed: -1 is outside 0 to 9"
+    error = name_options(InvalidInput("no", hint="Name it as the rig: --rig a.npz.", argument="rig"))
+    assert error.hint == "Name it as the rig: --rig a.npz."
     error = name_options(InvalidInput("no", where="file", hint="Choose extra_columns tag.", argument="extra_columns"))
     assert str(error) == "file: no\n  Choose --extra-columns tag."
 

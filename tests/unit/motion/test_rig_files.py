@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import contextlib
+import itertools
 import json
 import struct
-import time
+import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from marey.core.errors import InvalidFile, InvalidInput, MareyError, NotFound, TooLarge
+from marey.core.errors import InvalidFile, InvalidInput, NotFound, TooLarge
 from marey.exporters import Coordinates, exporters
 from marey.motion.export_options import ExportOptions
 from marey.motion.io.bvh import BvhClip
@@ -300,13 +300,17 @@ def _json_rig(parents):
     ],
     ids=["chain", "star", "short chains", "comb"],
 )
-def test_the_parts_of_the_largest_rigs_are_looked_for_in_seconds(parents):
-    """A chain of a hundred joints took ten seconds, one of a thousand hours."""
-    data = _json_rig(parents)
-    started = time.process_time()
-    with pytest.raises(InvalidInput, match="no joint found"):
-        RigBody.of(parse_json_rig(data, "x.json"))
-    assert time.process_time() - started < 10
+def test_the_parts_of_the_largest_rigs_are_looked_for_in_few_steps(parents):
+    """A chain of a hundred joints took ten seconds, one of a thousand hours. Calls are counted, not time: a million
+    take a tenth of a second."""
+    data, calls = _json_rig(parents), itertools.count()
+    sys.setprofile(lambda *_: next(calls) and None)
+    try:
+        with pytest.raises(InvalidInput, match="no joint found"):
+            RigBody.of(parse_json_rig(data, "x.json"))
+    finally:
+        sys.setprofile(None)
+    assert next(calls) < 4_000_000
 
 
 def test_too_many_joints_are_refused_before_they_are_read():
@@ -330,24 +334,6 @@ def test_a_rig_that_is_not_there(tmp_path):
         file.truncate(64 * 2**20 + 1)
     with pytest.raises(TooLarge, match="over the limit of 64 MiB"):
         load_body(big)
-
-
-@pytest.mark.parametrize("extension", ["glb", "json", "bvh"])
-def test_broken_files_give_only_our_errors(extension):
-    rig = reference_rig("mixamo")
-    good = {
-        "glb": lambda: format_rigged_glb(on_body(WALK, RigBody.of(rig))),
-        "json": lambda: format_json_rig(rig),
-        "bvh": lambda: exporters()["bvh"].write(WALK, Coordinates.of(ExportOptions(), "cm", "y")),
-    }[extension]()
-    parse = {"glb": parse_glb_rig, "json": parse_json_rig, "bvh": parse_bvh_rig}[extension]
-    draw = np.random.default_rng(7)
-    for _ in range(60):
-        data = bytearray(good[: int(draw.integers(20, min(len(good), 20_000)))] if draw.integers(2) else good)
-        for place in draw.integers(0, min(len(data), 4000), 3):
-            data[place] = int(draw.integers(256))
-        with contextlib.suppress(MareyError):
-            parse(bytes(data), "x")
 
 
 def test_a_glb_whose_chunk_claims_more_than_the_file_holds():

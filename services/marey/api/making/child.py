@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import os
-import resource
 import signal
 import sys
 import traceback
@@ -20,6 +19,7 @@ from marey.api.making.messages import read_message, write_message
 from marey.core.characters import check_text
 from marey.core.errors import Conflict, InvalidFile, InvalidInput, MareyError, TooLarge
 from marey.core.extras import MissingExtra, extra
+from marey.core.memory import limit_memory
 from marey.exporters.making import FileRecipe, RigFile
 from marey.motion.export_options import ExportOptions
 
@@ -36,12 +36,11 @@ def main(seconds: int, memory: int) -> None:
 
     Args:
         seconds: of one file; then the process ends by SIGALRM.
-        memory: bytes of address space.
+        memory: bytes of memory.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the group; the end of stdin ends this process
     os.nice(NICENESS)
-    with suppress(OSError, ValueError):  # macOS has no such limit
-        resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+    limit_memory(memory)
     with suppress(OSError):  # where memory runs out, Linux ends this process before the API
         Path("/proc/self/oom_score_adj").write_text("1000")
     requests, answers = sys.stdin.buffer, os.fdopen(os.dup(sys.stdout.fileno()), "wb")
@@ -124,7 +123,8 @@ def _rig_problem(error: MareyError, request: dict[str, Any]) -> dict[str, Any]:
     where = error.where if error.where in ("format", "map") else "body"
     if isinstance(error, MissingExtra):
         hint = f"Ask its operator for the extra {error.extra!r}."
-        error = InvalidInput("this server reads no rigs", hint=hint)
+        of = f" in {request['format']}" if error.extra == "usd" else ""
+        error = InvalidInput(f"this server reads no rigs{of}", hint=hint)
     return {"type": error.problem_type, "message": error.message, "where": where, "hint": error.hint}
 
 

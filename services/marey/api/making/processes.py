@@ -27,7 +27,7 @@ MOST = 2
 FILE_SECONDS = 120
 """Of one file."""
 MEMORY = 768 * 2**20
-"""Bytes of address space of one process."""
+"""Bytes of memory of one process."""
 IDLE_SECONDS = 60.0
 Answer = TypeVar("Answer")
 
@@ -39,7 +39,7 @@ class MakingProcess:
 
     Args:
         seconds: of one file.
-        memory: bytes of its address space.
+        memory: bytes of its memory.
     """
 
     def __init__(self, seconds: int = FILE_SECONDS, memory: int = MEMORY) -> None:

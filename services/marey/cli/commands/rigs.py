@@ -19,7 +19,7 @@ COLUMNS = ("name", "version", "format", "size", "added_by", "updated", "sha256")
 
 @app.command()
 def add(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="The character: .glb, .gltf, .vrm, .fbx, .bvh, .json.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The character: .glb, .vrm, .fbx, .usd, .bvh, .json.")],
     name: Annotated[str | None, typer.Option("--name", help="Name of the rig; the file's by default.")] = None,
     rig_map: RigMap = None,
     as_json: console.Json = False,
@@ -73,7 +73,7 @@ def _cell(rig: Mapping[str, Any], column: str) -> object:
 @app.command()
 def show(
     rig: Annotated[
-        str, typer.Argument(metavar="NAME|FILE", help="mixamo, ue4, humanik, or a file such as .glb, .bvh or .json.")
+        str, typer.Argument(metavar="NAME|FILE", help="mixamo, ue4, humanik, or a file such as .glb, .usd or .bvh.")
     ],
     rig_map: RigMap = None,
     as_json: console.Json = False,

@@ -28,6 +28,8 @@ __all__ = ["MAX_BYTES", "MAX_FRAMES", "BvhClip", "format_bvh", "parse_bvh", "rea
 
 MAX_BYTES = 512 * 2**20  # the longest known capture takes are under 100 MB
 MAX_FRAMES = 1_000_000  # over two hours at 120 fps
+WIDEST = 32
+"""Bytes of a number with the blanks around it, where only the first frames are read."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,15 +97,20 @@ def parse_bvh(
     up: Up = "y",
     rest_frame: Literal["auto", "keep", "drop"] = "auto",
     translation: Literal["auto", "replace", "add"] = "auto",
+    frames: int | None = None,
 ) -> BvhClip:
-    """Read the bytes of a BVH file; see `read_bvh`. `where` names it in errors."""
+    """Read the bytes of a BVH file; see `read_bvh`. `where` names it in errors.
+
+    Args:
+        frames: read only so many of the first frames; what follows is not looked at.
+    """
     if len(data) > MAX_BYTES:
         message = f"{len(data) / 2**20:.0f} MiB, over the limit of {MAX_BYTES / 2**20:.0f} MiB"
         raise TooLarge(message, where=where)
     header = BvhHeader(data, where)
-    values = _numbers(data, header, where)
+    values = _numbers(data, header, where, frames)
     joints, notes = header.joints, header.notes
-    if header.frames != len(values):
+    if header.frames != len(values) and frames is None:
         notes.append(f"line {header.frames_line}: the header says {header.frames} frames, the file holds {len(values)}")
     given = [j.name for j in joints]
     notes += [f"there are several joints {name}" for name, count in Counter(given).items() if count > 1]
@@ -199,33 +206,53 @@ def _are_added(tree: Skeleton, rotations: Array, channels: Array, given: Array, 
     return abs(lowest + float(offsets[0, axis])) < abs(lowest)
 
 
-def _numbers(data: bytes, header: BvhHeader, where: str) -> Array:
+def _numbers(data: bytes, header: BvhHeader, where: str, frames: int | None) -> Array:
     """Parse the motion (T, C). The fast path reads all at once; a broken file is read again line by line, for the
     message."""
+    width = header.channels
+    if not width:
+        raise header.fail("no joint has channels: there is no motion")
+    motion = data[header.motion_at :] if frames is None else _first_frames(data, header, frames)
     with warnings.catch_warnings():
         # Up to numpy 2.2 text that is not a number is a DeprecationWarning and an early end, later a ValueError.
         warnings.simplefilter("error", DeprecationWarning)
         try:
-            values = np.fromstring(data[header.motion_at :], np.float64, sep=" ")
+            values = np.fromstring(motion, np.float64, sep=" ")
         except (DeprecationWarning, ValueError):
             values = None
-    width = header.channels
-    if not width:
-        raise header.fail("no joint has channels: there is no motion")
-    if values is None or not (np.abs(values) <= LARGEST).all() or not _lines_hold_frames(data, header):
-        raise _first_fault(data, header, where)
+    if values is None or not (np.abs(values) <= LARGEST).all() or not _lines_hold_frames(motion, width):
+        raise _first_fault(motion, header, where)
     if values.size // width > MAX_FRAMES:
         raise TooLarge(f"{values.size // width} frames, over the limit of {MAX_FRAMES}", where=where)
     if not values.size:
         raise header.fail("holds no frames")
-    return values.reshape(-1, width)
+    return values.reshape(-1, width)[:frames]
 
 
-def _lines_hold_frames(data: bytes, header: BvhHeader) -> bool:
+def _first_frames(data: bytes, header: BvhHeader, frames: int) -> bytes:
+    """Return the text of at least so many frames if there are as many; it ends where a frame does."""
+    width, wanted = header.channels, frames * header.channels
+    head = data[header.motion_at : header.motion_at + wanted * WIDEST]
+    if header.motion_at + len(head) == len(data):
+        return head
+    numbers = size = whole = 0
+    for line in head.splitlines(keepends=True)[:-1]:  # the last may be cut
+        numbers, size = numbers + len(line.split()), size + len(line)
+        if numbers % width == 0:
+            whole = size
+            if numbers >= wanted:
+                break
+    if whole:
+        return head[: size if numbers > wanted else whole]  # beyond without an end of a frame: a fault is between
+    words = head.split()[:-1]  # a line of many frames
+    return b" ".join(words[: len(words) // width * width] or words)
+
+
+def _lines_hold_frames(motion: bytes, width: int) -> bool:
     """Return True if no frame ends and another begins within a line, except on a line of whole frames. A frame may
     take several lines. A number that is missing in one line and too many in the next fails, though the total fits."""
-    width, inside = header.channels, 0  # numbers of the frame before this line
-    for line in data[header.motion_at :].splitlines():
+    inside = 0  # numbers of the frame before this line
+    for line in motion.splitlines():
         count = len(line.split())
         if inside + count > width and (inside or count % width):
             return False
@@ -233,9 +260,9 @@ def _lines_hold_frames(data: bytes, header: BvhHeader) -> bool:
     return not inside
 
 
-def _first_fault(data: bytes, header: BvhHeader, where: str) -> InvalidFile:
+def _first_fault(motion: bytes, header: BvhHeader, where: str) -> InvalidFile:
     """Return the error for the first line of numbers that differs from the header."""
-    lines = data[header.motion_at :].decode("latin-1").splitlines()
+    lines = motion.decode("latin-1").splitlines()
     for number, text in enumerate(lines, start=header.motion_line):
         words = text.split()
         for word in words:

@@ -9,6 +9,8 @@ from marey.core.errors import InvalidFile, TooLarge
 
 MAX_JOINTS = 512  # a rig with face and fingers has about 300
 LARGEST = 1e9  # limit of any number, degrees or millimetres
+MAX_HEADER, MAX_LINE = 2**21, 2**16
+"""Bytes before the numbers, and of a line there: four kilobytes a joint, and 256 joints in a line."""
 
 
 @dataclass
@@ -46,6 +48,9 @@ class BvhHeader:
         while at < len(data):
             end = data.find(b"\r" if alone else b"\n", at)
             end = len(data) if end < 0 else end
+            if end - at > MAX_LINE or end > MAX_HEADER:
+                limit = f"a line of over {MAX_LINE:,}" if end - at > MAX_LINE else f"over {MAX_HEADER:,}"
+                raise TooLarge(f"has {limit} bytes before its numbers", where=f"{self.where}, line {self.line}")
             raw, at = data[at:end], end + 1
             try:
                 yield raw.decode("utf-8").strip(), at

@@ -7,7 +7,9 @@ The format is Autodesk's and not documented by it; layout and constants are thos
 from __future__ import annotations
 
 import struct
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -36,9 +38,9 @@ class Long(int):
 Property = bool | int | float | str | bytes | NDArray[Any]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False, slots=True)
 class FbxNode:
-    """A node of a file.
+    """A node of a file. Not frozen: a file has thousands, and frozen ones take three times as long to make.
 
     Attributes:
         name: its name, ASCII.
@@ -67,43 +69,73 @@ def node(
 def encode(top: list[FbxNode]) -> bytes:
     """Return the bytes of a file with these nodes at its top."""
     data = bytearray(MAGIC + struct.pack("<I", VERSION))
+    known: dict[int, bytes] = {}
     for each in top:
-        _append(data, each)
+        _append(data, each, known)
     data += bytes(13) + FOOTER_ID
     data += bytes(16 - len(data) % 16)
     data += bytes(4) + struct.pack("<I", VERSION) + bytes(120) + FOOTER_MAGIC
     return bytes(data)
 
 
-def _append(data: bytearray, each: FbxNode) -> None:
-    """Append a node with all below it: its header holds the place where it ends."""
-    name, start = each.name.encode("ascii"), len(data)
-    properties = b"".join(_property(value) for value in each.properties)
-    data += bytes(12) + bytes([len(name)]) + name + properties
+def _append(data: bytearray, each: FbxNode, known: dict[int, bytes]) -> None:
+    """Append a node with all below it: it begins with the place where it ends.
+
+    Args:
+        known: content by the node's `id`, of nodes without children: times and flags stand in hundreds of curves.
+    """
+    start = len(data)
+    data += bytes(4)
+    data += _content(each)
     for child in each.children:
-        _append(data, child)
+        if child.children or child.block:
+            _append(data, child, known)
+            continue
+        content = known.get(id(child))
+        if content is None:
+            content = known[id(child)] = _content(child)
+        data += _LENGTH.pack(len(data) + 4 + len(content))
+        data += content
     if each.children or each.block:
         data += bytes(13)
-    struct.pack_into("<III", data, start, len(data), len(each.properties), len(properties))
+    _LENGTH.pack_into(data, start, len(data))
 
 
-def _property(value: Property) -> bytes:
-    """Return the bytes of a property; arrays are not compressed, so that they do not depend on a version of zlib."""
-    match value:
-        case bool():
-            return struct.pack("<c?", b"C", value)
-        case Long():
-            return struct.pack("<cq", b"L", value)
-        case int():
-            return struct.pack("<ci", b"I", value)
-        case float():
-            return struct.pack("<cd", b"D", value)
-        case str():
-            content = value.encode()
-            return struct.pack("<cI", b"S", len(content)) + content
-        case bytes():
-            return struct.pack("<cI", b"R", len(value)) + value
-        case _:
-            letter = next(each for each, kind in ARRAYS.items() if np.dtype(kind) == value.dtype)
-            content = np.ascontiguousarray(value, ARRAYS[letter]).tobytes()
-            return struct.pack("<cIII", letter.encode(), value.size, 0, len(content)) + content
+def _content(each: FbxNode) -> bytes:
+    """Return the bytes of a node after the place where it ends, without those of its children."""
+    name, properties = _ascii(each.name), b"".join([_ENCODERS[type(value)](value) for value in each.properties])
+    return _COUNTS.pack(len(each.properties), len(properties), len(name)) + name + properties
+
+
+_LENGTH, _COUNTS, _COUNTED, _ARRAY = (struct.Struct(each) for each in ("<I", "<IIB", "<cI", "<cIII"))
+_LONG, _INT, _FLOAT, _BOOL = (struct.Struct(each) for each in ("<cq", "<ci", "<cd", "<c?"))
+_LETTERS = {np.dtype(kind): letter.encode() for letter, kind in ARRAYS.items()}
+
+
+@lru_cache(maxsize=4096)
+def _ascii(name: str) -> bytes:
+    return name.encode("ascii")
+
+
+@lru_cache(maxsize=4096)
+def _text(value: str) -> bytes:
+    content = value.encode()
+    return _COUNTED.pack(b"S", len(content)) + content
+
+
+def _array(value: NDArray[Any]) -> bytes:
+    """Return the bytes of an array; it is not compressed, so that they do not depend on a version of zlib."""
+    content = value.tobytes()
+    return _ARRAY.pack(_LETTERS[value.dtype], value.size, 0, len(content)) + content
+
+
+_ENCODERS: dict[type, Callable[[Any], bytes]] = {
+    bool: lambda value: _BOOL.pack(b"C", value),
+    Long: lambda value: _LONG.pack(b"L", value),
+    int: lambda value: _INT.pack(b"I", value),
+    float: lambda value: _FLOAT.pack(b"D", value),
+    str: _text,
+    bytes: lambda value: _COUNTED.pack(b"R", len(value)) + value,
+    np.ndarray: _array,
+}
+"""Bytes of a property by its type."""

@@ -162,6 +162,7 @@ def _add_animation(document: FbxDocument, poses: FilePoses, models: list[Long], 
     ]
     stack = document.add("AnimationStack", TAKE, "AnimStack", "", [node("Properties70", below=rows)])
     layer = document.add("AnimationLayer", "BaseLayer", "AnimLayer", "", [])
+    keys = _keys(times)
     document.connect(layer, stack)
     for joint, model in enumerate(models):
         tracks = [("R", "Lcl Rotation", angles[:, joint])]
@@ -172,19 +173,29 @@ def _add_animation(document: FbxDocument, poses: FilePoses, models: list[Long], 
             curves = document.add("AnimationCurveNode", letter, "AnimCurveNode", "", [node("Properties70", below=rows)])
             document.connect(curves, layer)
             document.connect(curves, model, attribute)
-            for axis, column in zip(AXES, values.T, strict=True):
-                curve = document.add("AnimationCurve", "", "AnimCurve", "", _curve(times, column))
+            for axis, column in zip(AXES, np.ascontiguousarray(values.T), strict=True):
+                curve = document.add("AnimationCurve", "", "AnimCurve", "", _curve(keys, column))
                 document.connect(curve, curves, f"d|{axis}")
 
 
-def _curve(times: np.ndarray, values: Array) -> list[FbxNode]:
-    """Return the contents of a curve: one linear key a frame."""
-    return [
-        node("Default", float(values[0])),
+def _keys(times: np.ndarray) -> tuple[FbxNode, ...]:
+    """Return what all curves have in common: one linear key a frame."""
+    return (
         node("KeyVer", 4008),
         node("KeyTime", times),
-        node("KeyValueFloat", values.astype(np.float32)),
         node("KeyAttrFlags", np.array([LINEAR], np.int32)),
         node("KeyAttrDataFloat", np.array([0, 0, 218434821, 0], np.int32).view(np.float32)),
         node("KeyAttrRefCount", np.array([len(times)], np.int32)),
+    )
+
+
+def _curve(keys: tuple[FbxNode, ...], values: Array) -> list[FbxNode]:
+    """Return the contents of a curve."""
+    version, times, *attributes = keys
+    return [
+        node("Default", float(values[0])),
+        version,
+        times,
+        node("KeyValueFloat", values.astype(np.float32)),
+        *attributes,
     ]

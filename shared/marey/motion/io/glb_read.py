@@ -47,7 +47,11 @@ def parse_glb(data: bytes, where: str = "glb") -> MotionClip:
     """Read the bytes of a glb file; see `read_glb`."""
     document, numbers = _chunks(data, where)
     try:
-        return _clip(_Document(document, numbers, where))
+        with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused below
+            clip = _clip(_Document(document, numbers, where))
+            if not np.isfinite(clip.joints).all():
+                raise InvalidFile("holds numbers that are too large", where=where)
+            return clip
     except InvalidFile:
         raise
     except (ValueError, KeyError, IndexError, TypeError, AttributeError, OverflowError, InvalidInput) as error:

@@ -6,6 +6,8 @@ import importlib
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+
 from marey.core.errors import InvalidInput
 from marey.motion.files import read_limited
 from marey.motion.rigs.rig import MAX_BYTES, Rig
@@ -21,6 +23,9 @@ READERS: dict[str, str] = {
     "vrma": "marey.motion.io.rig_gltf:parse_glb_rig",
     "bvh": "marey.motion.io.rig_bvh:parse_bvh_rig",
     "fbx": "marey.motion.io.rig_fbx:parse_fbx_rig",
+    "usd": "marey.motion.io.rig_usd:parse_usd_rig",
+    "usda": "marey.motion.io.rig_usd:parse_usd_rig",
+    "usdc": "marey.motion.io.rig_usd:parse_usd_rig",
     "npz": "marey.motion.io.rig_smplx:parse_smplx_rig",
     "json": "marey.motion.io.rig_json:parse_json_rig",
 }
@@ -40,7 +45,7 @@ def read_rig(path: Path | str) -> Rig:
     """
     path = Path(path)
     reader = _reader(path)
-    return reader(read_limited(path, LIMITS.get(_extension(path), MAX_BYTES)), str(path))
+    return _read(reader, read_limited(path, LIMITS.get(_extension(path), MAX_BYTES)), str(path))
 
 
 def parse_rig(data: bytes, name: str) -> Rig:
@@ -53,7 +58,12 @@ def parse_rig(data: bytes, name: str) -> Rig:
     Raises:
         InvalidInput, InvalidFile, TooLarge: as `read_rig`.
     """
-    return _reader(Path(name))(data, name)
+    return _read(_reader(Path(name)), data, name)
+
+
+def _read(reader: Reader, data: bytes, name: str) -> Rig:
+    with np.errstate(over="ignore", invalid="ignore"):  # `make_rig` refuses what is not finite
+        return reader(data, name)
 
 
 def _extension(path: Path) -> str:
