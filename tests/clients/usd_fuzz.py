@@ -38,7 +38,7 @@ files = {"text": (text, damaged_text), "binary": ((folder / "a.usdc").read_bytes
 
 
 def read_in_fork(path):
-    """What a fork says of a file: `read`, `refused` or `failed`; None where it says nothing of these."""
+    """Verdict of a fork on a file: `read`, `refused` or `failed`; None where it says nothing of these."""
     child = os.fork()
     if child == 0:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 2)

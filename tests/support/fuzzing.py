@@ -41,7 +41,7 @@ SECONDS, MEMORY = 2.0, 2**28
 
 @dataclass(frozen=True)
 class Format:
-    """What is read.
+    """Kind of file that is read.
 
     Attributes:
         damage: makes a damaged copy.

@@ -39,7 +39,7 @@ MAX_LOADED = 4
 """Cached pipelines: bundles of one text specification share one."""
 _loading = threading.RLock()
 _loaded: dict[str, TextPipeline] = {}
-_judges: dict[str, MeaningJudge] = {}
+_judges: dict[TextSpec, MeaningJudge] = {}
 
 
 class ParseBody(BaseModel):
@@ -230,9 +230,9 @@ def judge_of(spec: TextSpec) -> MeaningJudge:
     from marey.text.meaning import MeaningJudge
 
     with _loading:
-        if spec.encoder not in _judges:
-            _judges[spec.encoder] = MeaningJudge.of(load_pipeline(spec))
-        return _judges[spec.encoder]
+        if spec not in _judges:
+            _judges[spec] = MeaningJudge.of(load_pipeline(spec))
+        return _judges[spec]
 
 
 def load_pipeline(spec: TextSpec) -> TextPipeline:

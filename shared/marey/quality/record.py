@@ -29,6 +29,11 @@ class Flag(StrEnum):
     OFF_PROMPT = "off-prompt"
     CONSTRAINT_MISSED = "constraint-missed"
     POSTURE_JUMP = "posture-jump"
+    PART_LEFT_OUT = "part-left-out"
+
+
+OF_PROMPT = frozenset({Flag.OFF_PROMPT, Flag.PART_LEFT_OUT})
+"""Flags that tell what of a prompt is not shown, and no fault of the movement."""
 
 
 class PromptMatch(BaseModel):
@@ -38,7 +43,8 @@ class PromptMatch(BaseModel):
 
     value: float | None = Field(
         default=None,
-        description="0 to 1; from 0.5 on it shows them in their order. Null where the prompt names no action.",
+        description="0 to 1; from 0.5 on it shows them in their order. Null where the prompt names no action, and "
+        "where a part of it is left out that no rule judges and the others are shown.",
     )
     by: Literal["check"] = Field(default="check", description="`check`: by rules on the joints.")
     percentile: int | None = Field(
@@ -65,7 +71,8 @@ class MotionQuality(BaseModel):
     self_contact: float = Field(description="Deepest that limbs, trunk and head pass into each other, millimetres.")
     flags: list[Flag] = Field(
         description="Measures beyond their limits; `off-prompt`: a match under 0.5; `constraint-missed`: a constraint "
-        "beyond its bar; `posture-jump`: a row of a timeline begins in a posture that the row before does not end in."
+        "beyond its bar; `posture-jump`: a row of a timeline begins in a posture that the row before does not end in; "
+        "`part-left-out`: a part of the prompt asks for a movement that was not read."
     )
     ok: bool = Field(description="True without flags.")
     match: PromptMatch | None = Field(default=None, description="Null for motions of earlier releases.")
@@ -79,6 +86,13 @@ class MotionQuality(BaseModel):
         if match.value is not None and match.value < SHOWN:
             flags.append(Flag.OFF_PROMPT)
         return self.model_copy(update={"match": match, "flags": flags, "ok": not flags})
+
+    def with_part_left_out(self) -> MotionQuality:
+        """Return the record of a motion that leaves out a part of its prompt: that it shows all of it cannot be said,
+        only that it does not."""
+        match = self.match if self.match is None or (self.match.value or 0.0) < SHOWN else PromptMatch()
+        flags = [*(flag for flag in self.flags if flag is not Flag.PART_LEFT_OUT), Flag.PART_LEFT_OUT]
+        return self.model_copy(update={"match": match, "flags": flags, "ok": False})
 
     def with_posture_jump(self) -> MotionQuality:
         """Return the record with the flag of a timeline whose rows do not fit together."""

@@ -34,6 +34,7 @@ class TextFeatures:
     actions: tuple[str, ...] = ()  # in the order of time, each as a sentence (`marey.text.actions`)
     action_rows: NDArray[np.float16] | None = None  # (A, W) their pooled encodings
     seconds: float | None = None  # length of the motion that the rewriter proposes
+    left_out: tuple[str, ...] = ()  # its parts that ask for a movement, and that nothing of its reading covers
     movements: tuple[TextFeatures, ...] = ()  # its movements in the order of time, if there are several
 
     @property
@@ -70,6 +71,8 @@ class TextFeatures:
             about["seconds"] = self.seconds
         if self.action_rows is not None:
             about["acts"] = list(self.actions)
+        if self.left_out:
+            about["left_out"] = list(self.left_out)
         if self.movements:
             about["movements"] = [movement._about() for movement in self.movements]
         return about
@@ -118,7 +121,8 @@ class TextFeatures:
             movements.append(movement)
         return cls(
             about["prompt"], about["rewritten"], graph, rows[:count], about.get("not_rewritten"), actions,
-            rows[count:end] if actions else None, about.get("seconds"), tuple(movements),
+            rows[count:end] if actions else None, about.get("seconds"), tuple(about.get("left_out", ())),
+            tuple(movements),
         ), left  # fmt: skip
 
 

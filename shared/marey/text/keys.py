@@ -19,13 +19,13 @@ from marey.vocabulary.bearings import bearings_sha256
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.scope import VERSION, ActionLists
 
-PIPELINE_VERSION = 5
+PIPELINE_VERSION = 6
 """Raise it when the graph, the actions or the features of the same prompt change for any reason but weights."""
 REWRITER_VERSIONS = {"none": 1, "rules": 1, "openai": 2, "tca": 2}
 ASKING = frozenset({"openai", "tca"})
 """Rewriters that ask a language model."""
 LABELLER_BUNDLES = {"light": "srl-light", "bert-srl": "srl-bert"}
-MEANING_VERSION = 3
+MEANING_VERSION = 4
 """Raise it when `marey.text.meaning` judges the same prompt otherwise for any reason but the vocabulary."""
 NO_LABELLER = "none"
 """A spec may say so: graphs are the motion node alone."""

@@ -17,7 +17,7 @@ from marey.text.kept_vectors import KeptVectors
 from marey.vocabulary.entries import Action, load_vocabulary
 from marey.vocabulary.inflection import third_person
 from marey.vocabulary.lexicon import EXACT, WILDCARD
-from marey.vocabulary.scope import ActionLists, Scope, match_as, match_as_thing, match_scope
+from marey.vocabulary.scope import ActionLists, Scope, match_as, match_as_thing, match_left_out, match_scope
 from marey.vocabulary.take_names import as_words
 
 if TYPE_CHECKING:
@@ -34,26 +34,32 @@ CHUNK = 64
 
 Pooled = Callable[[Sequence[str]], list[NDArray[np.float32]]]
 """One unit vector a text: `TextPipeline.pooled`."""
+LeftOut = Callable[[Sequence[str]], Sequence[tuple[str, ...]]]
+"""Parts of each prompt that its reading leaves out: `TextPipeline.left_out`."""
 
 
 class MeaningJudge:
     """Judge of prompts that words leave undecided. Vectors of phrases are computed on first use and kept."""
 
-    def __init__(self, pooled: Pooled, kept: KeptVectors | None = None) -> None:
+    def __init__(self, pooled: Pooled, kept: KeptVectors | None = None, left_out: LeftOut | None = None) -> None:
         """Put a judge together; most callers want `of`.
 
         Args:
             kept: files of the vectors of all phrases, which take seconds to make; None = none.
+            left_out: returns the parts of prompts that the readers leave out; None = they are not looked for.
         """
         self._pooled = pooled
         self._kept = kept
+        self._left_out = left_out
         self._vectors: dict[tuple[str, ...], NDArray[np.float32]] = {}
         self._verbs: tuple[list[str], NDArray[np.float32]] | None = None
 
     @classmethod
     def of(cls, pipeline: TextPipeline, *, config: Settings | None = None) -> MeaningJudge:
         """Return the judge by the encoder of a pipeline, with the vectors that the home keeps."""
-        return cls(pipeline.pooled, KeptVectors((config or settings()).home, pipeline.encoder.sha256))
+        return cls(
+            pipeline.pooled, KeptVectors((config or settings()).home, pipeline.encoder.sha256), pipeline.left_out
+        )
 
     def judge(self, prompt: str, lists: ActionLists) -> Scope:
         """Return the scope of a prompt, by its words where they decide.
@@ -65,6 +71,9 @@ class MeaningJudge:
         scope = match_scope(prompt, lists)
         if scope.left is None:
             return scope
+        if scope.left == "part":
+            (parts,) = self._left_out([prompt]) if self._left_out is not None else [()]
+            return match_left_out(_decided(scope), parts)
         (vector,) = self._pooled([as_words(prompt)])
         if scope.left == "noun":
             names = [each.action for each in scope.actions if each.action is not None]

@@ -26,9 +26,11 @@ from marey.text.features import TextFeatures
 from marey.text.graph import Node, SemanticGraph, build_graph
 from marey.text.guard import changed_but_aligned, changed_meaning, lost_meaning
 from marey.text.in_place_words import with_plain_gait_in_place
+from marey.text.kept_texts import KeptTexts
 from marey.text.keys import NO_LABELLER, feature_key
 from marey.text.known_verbs import with_known_verbs
 from marey.text.labellers import OneAtATime
+from marey.text.left_out import may_leave_out, parts_left_out
 from marey.text.loading import load_encoder, load_labeller, load_rewriter
 from marey.text.misleading_words import without_misleading
 from marey.text.order_reader import FILE as ORDER_FILE
@@ -38,7 +40,7 @@ from marey.text.plain_phrases import with_plain_phrases
 from marey.text.reading_encoder import reading_encoder
 from marey.text.readings import ReadPrompt, TrainedReaders
 from marey.text.rewriters import NotRewritten, PromptRewriter, Rewrite
-from marey.text.roles import RoleLabeller
+from marey.text.roles import Frame, RoleLabeller
 from marey.text.sequence_reader import ReadMovement
 from marey.text.stunt_words import with_plain_stunts
 from marey.text.time_order import in_time_order
@@ -92,6 +94,9 @@ class TextPipeline:
         self._speller: Speller | None = None
         self._texts = EncodedTexts(encoder)
         self._texts_to_read, self._texts_to_order = self._encoded_for_readers()
+        self._kept_readings = KeptTexts[ReadPrompt]()
+        self._kept_frames = KeptTexts[tuple[Frame, ...]]()
+        self._kept_parts = KeptTexts[tuple[str, ...]]()
 
     @classmethod
     def load(cls, spec: TextSpec, *, encoder_path: Path | None = None) -> TextPipeline:
@@ -223,6 +228,7 @@ class TextPipeline:
         rewritten = self._rewritten(prompts)
         readings = self._readings([each.text for each in rewritten])
         read = self._read(readings)
+        left_out = self._left_out([each.text for each in rewritten])
         graphs = [self._graphs([each.worded for each in reading.movements]) for reading in readings]
         self._encode_together([*(graph for graph, _ in read), *chain(*graphs)], [actions for _, actions in read])
         return [
@@ -230,10 +236,11 @@ class TextPipeline:
                 self._features(prompt, graph, actions),
                 not_rewritten=rewrite.refused,
                 seconds=rewrite.seconds,
+                left_out=parts,
                 movements=self._movements(reading.movements, movements),
             )
-            for prompt, rewrite, reading, (graph, actions), movements in zip(
-                prompts, rewritten, readings, read, graphs, strict=True
+            for prompt, rewrite, reading, parts, (graph, actions), movements in zip(
+                prompts, rewritten, readings, left_out, read, graphs, strict=True
             )
         ]
 
@@ -255,14 +262,45 @@ class TextPipeline:
 
     def _readings(self, texts: Sequence[str]) -> list[ReadPrompt]:
         """Return what each text asks for, as far as `TextSpec.plain_action` and `TextSpec.movements` say."""
+        return self._kept_readings.get(texts, self._find_readings)
+
+    def _find_readings(self, texts: Sequence[str]) -> list[ReadPrompt]:
         if not self.spec.plain_action:
             return [ReadPrompt(text) for text in texts]
         texts = [_in_known_words(text) for text in texts]
         encoded, ordered = self._texts_to_read, self._texts_to_order
         if encoded is None or ordered is None:
             return [ReadPrompt.of(text, only_action(text)) for text in texts]
-        readers = TrainedReaders(encoded.pooled, encoded.encodings, ordered.encodings, movements=self.spec.movements)
-        return readers.read(texts)
+        return self._readers(encoded, ordered).read(texts)
+
+    def _readers(self, encoded: EncodedTexts, ordered: EncodedTexts) -> TrainedReaders:
+        return TrainedReaders(encoded.pooled, encoded.encodings, ordered.encodings, movements=self.spec.movements)
+
+    def left_out(self, prompts: Sequence[str]) -> list[tuple[str, ...]]:
+        """Return the parts of each prompt that ask for a movement, and that nothing of its reading covers; none where
+        prompts are read by their words alone.
+
+        Raises:
+            InvalidInput: a prompt cannot be used (`check_prompt`).
+        """
+        rewritten = self._rewritten([check_prompt(prompt, stored=True) for prompt in prompts])
+        return self._left_out([each.text for each in rewritten])
+
+    def _left_out(self, texts: Sequence[str]) -> list[tuple[str, ...]]:
+        return self._kept_parts.get(texts, self._find_left_out)
+
+    def _find_left_out(self, texts: Sequence[str]) -> list[tuple[str, ...]]:
+        encoded, ordered = self._texts_to_read, self._texts_to_order
+        if encoded is None or ordered is None or self.spec.labeller == NO_LABELLER:
+            return [()] * len(texts)
+        known = [_in_known_words(text) for text in texts]
+        several = [text for text in known if may_leave_out(text)]
+        frames = dict(zip(several, self._frames(several), strict=True))
+        clause = self._readers(encoded, ordered).clause
+        return [
+            parts_left_out(text, frames[text], reading, clause) if text in frames else ()
+            for text, reading in zip(known, self._readings(texts), strict=True)
+        ]
 
     def _encoded_for_readers(self) -> tuple[EncodedTexts, EncodedTexts] | tuple[None, None]:
         """Return the texts as the readers read them, and as that of the order of time does; None if prompts are read by
@@ -316,9 +354,12 @@ class TextPipeline:
         return self._texts.pooled(texts)
 
     def _graphs(self, texts: Sequence[str]) -> list[SemanticGraph]:
-        frames = self.labeller.label([text.split() for text in texts])
+        frames = self._frames(texts)
         caps = {"max_actions": self.spec.max_actions, "max_specifics": self.spec.max_specifics}
         return [build_graph(text, found, **caps) for text, found in zip(texts, frames, strict=True)]
+
+    def _frames(self, texts: Sequence[str]) -> list[tuple[Frame, ...]]:
+        return self._kept_frames.get(texts, lambda missing: self.labeller.label([text.split() for text in missing]))
 
     def _span(self, sentence: Encoding, graph: SemanticGraph, starts: list[int], node: Node) -> NDArray[np.float32]:
         if node.level == "motion":

@@ -126,7 +126,7 @@ def only_action(prompt: str) -> str | None:
     if len(prompt.split()) > MOST_WORDS:
         return None
     scope = match_scope(prompt, every_action())
-    if scope.left is not None:
+    if scope.left not in (None, "part"):
         return None
     vocabulary = load_vocabulary()
     found = {each.action for each in scope.actions if each.action is not None}

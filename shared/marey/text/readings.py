@@ -134,6 +134,10 @@ class TrainedReaders:
         self._encode_together([each if each.text else as_written(each.prompt) for each in bare])
         return [self._carried(self._apart(self._whole(each), each), each) for each in bare]
 
+    def clause(self, text: str) -> ReadClause:
+        """Return the surest clause that the reader of sequences takes a part of a prompt for."""
+        return max(self._clauses_of(as_written(text)), key=lambda clause: clause.probability)
+
     def _whole(self, bare: BarePrompt) -> ReadPrompt:
         return self._borne(bare) or self._reading(as_written(bare.prompt))
 

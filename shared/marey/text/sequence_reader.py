@@ -117,7 +117,7 @@ _WITHOUT = re.compile(r"\bwithout (?:\w+ly )?\w+ing\b[^,;.]*", re.IGNORECASE)
 """Words of what does not come with a movement, which is done all the same."""
 _IN_TIME = re.compile(r"^\W*(?:and )?(?:then|finally|afterwards?|after that)\b|^\W*(?:and )?stops?\b", re.IGNORECASE)
 """Beginning of a clause that comes behind all before it."""
-_STOPS = re.compile(r"(?:(?:he|she|they|an? \w+|the \w+) )?(?:stop|halt|paus|stand|com\w* to (?:a|an) )", re.IGNORECASE)
+STOPS = re.compile(r"(?:(?:he|she|they|an? \w+|the \w+) )?(?:stop|halt|paus|stand|com\w* to (?:a|an) )", re.IGNORECASE)
 """Beginning of a clause that ends the way before it."""
 
 
@@ -358,7 +358,7 @@ def _turn_and_rest(clauses: Sequence[ReadClause]) -> tuple[ReadMovement, ...]:
 def _stops_on_a_way(clauses: Sequence[ReadClause]) -> bool:
     """Return True if a way ends with a stop: "walks forward, stops and looks around"."""
     return any(
-        way.name in WAYS and after.name == STANDING and _STOPS.match(without_joints(after.text)) is not None
+        way.name in WAYS and after.name == STANDING and STOPS.match(without_joints(after.text)) is not None
         for way, after in itertools.pairwise(clauses)
     )
 
@@ -417,7 +417,7 @@ def _movement(group: Sequence[ReadClause]) -> ReadMovement:
     single = len(group) == 1 and group[0].name != OUTSIDE and group[0].probability >= PLAIN
     outside = len(group) == 1 and group[0].name == OUTSIDE and group[0].probability >= PLAIN
     action = group[0].name if single else None if outside else only_named(without_gaze(text))
-    if action is None and (outside or _STOPS.match(text)) and not named_actions(text) - {STANDING}:
+    if action is None and (outside or STOPS.match(text)) and not named_actions(text) - {STANDING}:
         action = STANDING  # of words that they do not know, models make falls and hops
     likely = len(group) == 1 and group[0].name != OUTSIDE and group[0].probability >= LIKELY
     if action is None and likely and not named_actions(text):

@@ -25,7 +25,7 @@ _STRONG = re.compile(
 """Signs behind which another movement begins."""
 _COMMA = re.compile(r",\s+(?:and\s+)?(?=(?:(?:he|she|they)\s+)?(?:\w+ly\s+)?[a-z]+)", re.IGNORECASE)
 """Signs behind which one begins if a verb comes first."""
-_HERE = re.compile(
+HERE = re.compile(
     r"""\W*(?:\w+ed\b|(?:he|she|they|it)\ (?:is|are|looks?|seems?)\ (?!\w+ing\b)
     |(?:stay|remain|keep|hold|wait|repeat|continue|finish|start|begin|try|make)\w*\b)""",
     re.IGNORECASE | re.VERBOSE,
@@ -44,7 +44,7 @@ def clauses_apart(text: str) -> list[str]:
             or comes_with(joined[-1], said)
             or is_end(said)
             or goes_on(said)
-            or _HERE.match(said)
+            or HERE.match(said)
             or only_gaze(said)
         )
         if belongs:

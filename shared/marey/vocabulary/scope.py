@@ -31,9 +31,10 @@ ScopePolicy = Literal["warn", "refuse", "ignore"]
 """Treatment of prompts with an unknown action: accepted with a warning, refused, or not examined."""
 POLICIES: tuple[ScopePolicy, ...] = get_args(ScopePolicy)
 
-Left = Literal["noun", "verb"]
+Left = Literal["noun", "verb", "part"]
 """Kinds of prompts that the words leave undecided. `noun`: a noun that names an action may stand for a thing ("a bow");
-`verb`: a person does something in a verb that is in no list."""
+`verb`: a person does something in a verb that is in no list; `part`: actions are named, but none in one of the clauses,
+which may ask for a movement ("walks in, then hoists the sail")."""
 
 VERSION = 1
 STANDING = "idle"
@@ -184,7 +185,7 @@ class ScopeMatcher:
         travels = frozenset(
             action.id for action in vocabulary.actions.values() if action.in_place and not action.kind_of
         )
-        self._vocabulary = vocabulary
+        self._vocabulary, self._lists = vocabulary, lists
         self._phrases = PhraseFinder(lexicon, lists, travels)
         self._roles = PhraseRoles(lexicon, lists, vocabulary, travels)
         handling = frozenset(
@@ -204,7 +205,23 @@ class ScopeMatcher:
         """Return the scope of a prompt relative to what a bundle supports."""
         prompt = as_words(prompt)
         bare = BarePrompt.of(prompt) if lists.drawn else as_written(prompt)
-        return (self._borne(bare, lists) if bare.stated else None) or self._match(prompt, lists)
+        scope = (self._borne(bare, lists) if bare.stated else None) or self._match(prompt, lists)
+        decided = scope.left is None and scope.verdict != "unknown"
+        return replace(scope, left="part") if decided and self._may_leave_out(prompt) else scope
+
+    def _may_leave_out(self, prompt: str) -> bool:
+        """Return True if one of several clauses names no action of the vocabulary."""
+        words = self._phrases.words(prompt)
+        found = (match for match in self._phrases.find(words) if any(each.action for each in match.meanings))
+        named = {at for match in found for at in range(match.start, match.end)}
+        clauses = list[list[int]]([[]])
+        for at, word in enumerate(words):
+            if word.text in self._lists.breaks:
+                clauses.append([])
+            elif word.text.isalpha() and word.text not in self._lists.skipped and not word.text.endswith("ly"):
+                clauses[-1].append(at)
+        said = [clause for clause in clauses if clause]
+        return len(said) > 1 and not all(named & set(clause) for clause in said)
 
     def _borne(self, bare: BarePrompt, lists: ActionLists) -> Scope | None:
         """Return the scope of a prompt whose bearings are drawn: that of its other words, and the gestures, which every
@@ -355,6 +372,11 @@ def match_scope(prompt: str, lists: ActionLists) -> Scope:
 def match_as(prompt: str, action: str, lists: ActionLists) -> Scope:
     """Return the scope of a prompt whose words name no action, read as an action of the vocabulary."""
     return _matcher().read_as(prompt, action, lists)
+
+
+def match_left_out(scope: Scope, parts: Iterable[str]) -> Scope:
+    """Return the scope of a prompt of which these parts ask for movements that are in no action that is read."""
+    return replace(scope, actions=(*scope.actions, *(NamedAction(part[:MAX_TEXT], "unknown") for part in parts)))
 
 
 def match_as_thing(scope: Scope, prompt: str) -> Scope:

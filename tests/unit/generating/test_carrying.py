@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from marey.generation.carrying import lifts_load, puts_load
 from marey.generation.fine_wish import FineWish
 from marey.generation.loaded import with_load
 from marey.generation.stated import stated_features
@@ -13,6 +12,7 @@ from marey.generation.timed import TimedText
 from marey.motion.features import HUMANML3D_263
 from marey.text.features import TextFeatures
 from marey.text.graph import build_graph
+from marey.vocabulary.loads import lifts_load, puts_load
 from tests.support.bodies import Body, steady
 
 LAYOUT = HUMANML3D_263

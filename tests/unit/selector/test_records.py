@@ -105,3 +105,13 @@ def test_the_table_leaves_out_actions_that_real_clips_do_not_match() -> None:
 @pytest.mark.parametrize("action", ["walk", "run", "turn"])
 def test_the_actions_most_in_demand_have_a_percentile(action: str) -> None:
     assert action in real_values()
+
+
+def test_a_motion_that_leaves_out_a_part_does_not_show_its_prompt() -> None:
+    record = MotionQuality(
+        support=["feet"], float_s=0, skate=0, penetration_mm=0, pops=0, range_deg=0, self_contact=0, flags=[], ok=True
+    )
+    left_out = record.with_match(PromptMatch(value=1.0)).with_part_left_out()
+    assert (left_out.flags, left_out.ok, left_out.match) == ([Flag.PART_LEFT_OUT], False, PromptMatch())
+    low = record.with_match(PromptMatch(value=0.2)).with_part_left_out()
+    assert (low.flags, low.match) == ([Flag.OFF_PROMPT, Flag.PART_LEFT_OUT], PromptMatch(value=0.2))

@@ -24,7 +24,7 @@ from marey.generation.timed import part_seed
 from marey.items.settings import BEST_OF, OUTPUT_FPS, PLATFORM_SETTINGS, REDRAWS
 from marey.motion.body import NamedBody
 from marey.motion.clip import SELECTION, MotionClip
-from marey.quality.record import SHOWN, Flag, read_quality
+from marey.quality.record import OF_PROMPT, SHOWN, read_quality
 from marey.quality.selection import Candidate, Selection
 
 ROWS_SHARE = 80
@@ -232,7 +232,7 @@ class _Draw:
         match = None if quality is None or quality.match is None else quality.match.value
         seed = candidate_seed(self.asked.seed, number)
         self._candidates.append(Candidate(index=number, seed=seed, flags=flags, ok=not flags, match=match))
-        shows, sound = match is None or match >= SHOWN, set(flags) <= {Flag.OFF_PROMPT}
+        shows, sound = match is None or match >= SHOWN, set(flags) <= OF_PROMPT
         self.good = self.good or (shows and sound)
         rank = (shows, sound, 0.0 if match is None else match)
         if rank > self._rank:

@@ -8,7 +8,6 @@ from typing import Any
 
 from marey.generation.asked import changes_of, draws_bearings
 from marey.generation.bearing import actions_alone, borne, borne_spans, with_bearing
-from marey.generation.carrying import puts_load
 from marey.generation.gazing import with_gaze
 from marey.generation.loaded import with_load
 from marey.generation.named import names_movement
@@ -27,10 +26,15 @@ from marey.quality.record import PromptMatch
 from marey.selector.matching import wanted_of
 from marey.selector.records import match_of
 from marey.selector.unshown import UNSHOWN_MOST, unshown_actions
+from marey.vocabulary.loads import puts_load
 from marey.vocabulary.scope import match_scope
 
 UNSHOWN = "unshown"
 """Key of a manifest: actions that the words of the prompt name, and that the motion does not show."""
+
+
+UNREAD = "unread"
+"""Key of a manifest: parts of the prompt that ask for a movement, and that were not read."""
 
 
 def manifest_of(generator: Generator[S], request: Request, settings: S) -> dict[str, Any]:
@@ -119,6 +123,9 @@ def judged(clip: MotionClip, request: Request, *, as_made: MotionClip | None = N
         match = PromptMatch(value=min(match.value or 0.0, UNSHOWN_MOST))
         clip = replace(clip, manifest={**clip.manifest, UNSHOWN: list(missed)})
     quality = quality.with_match(match)
+    if unread := _unread(request):
+        quality = quality.with_part_left_out()
+        clip = replace(clip, manifest={**clip.manifest, UNREAD: list(unread)})
     if posture_jumps(clip):
         quality = quality.with_posture_jump()
     return replace(clip, manifest={**clip.manifest, QUALITY: quality.model_dump(mode="json")})
@@ -132,6 +139,15 @@ def _prompts(request: Request) -> list[str]:
     if request.recording is not None:
         return [prompt for _, prompt in request.recording.prompts]
     return [request.text.prompt, request.text.rewritten]
+
+
+def _unread(request: Request) -> tuple[str, ...]:
+    """Return the parts of the prompts of a request that were not read."""
+    if request.recording is not None:
+        return ()
+    rows = () if request.timeline is None or request.is_sequence else request.timeline
+    texts = [row.text for row in rows] or [request.text]
+    return tuple(dict.fromkeys(part for text in texts for part in text.left_out))
 
 
 def _unshown(clip: MotionClip, request: Request) -> tuple[str, ...]:

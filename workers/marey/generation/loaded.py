@@ -13,13 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.checks.kinematics import smooth
-from marey.generation.carrying import WALKS, lifts_load, puts_load
+from marey.generation.carrying import WALKS
 from marey.generation.timed import CUT, TimedText
 from marey.generation.wish import action_of
 from marey.motion.features import FeatureLayout, encode_all
 from marey.motion.skeleton import HUMANML3D
 from marey.posing.standing import ARMS, StandingBody
 from marey.vocabulary.bearings import UPRIGHT, load_bearings
+from marey.vocabulary.loads import lifts_load, puts_load
 
 Array = NDArray[np.floating]
 Float32 = NDArray[np.float32]

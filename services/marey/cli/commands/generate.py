@@ -27,7 +27,8 @@ OFF_PROMPT = "off-prompt"
 SHOWN = 0.5
 """The match from which on a row of a timeline shows its prompt."""
 CONSTRAINT_MISSED, POSTURE_JUMP = "constraint-missed", "posture-jump"
-SAID_APART = (OFF_PROMPT, CONSTRAINT_MISSED, POSTURE_JUMP)
+PART_LEFT_OUT = "part-left-out"
+SAID_APART = (OFF_PROMPT, CONSTRAINT_MISSED, POSTURE_JUMP, PART_LEFT_OUT)
 """Flags that have sentences of their own."""
 
 if TYPE_CHECKING:
@@ -190,6 +191,9 @@ def _report_quality(line: dict[str, Any], clip: MotionClip) -> None:
             console.say(f"{about}: {times} s does not show {row['prompt']!r} (match {row['match']:g}).")
         if not missed:
             console.say(f"{about}: the motion does not show the prompt (match {quality['match']['value']:g}).")
+    if PART_LEFT_OUT in quality["flags"]:
+        parts = ", ".join(map(repr, clip.manifest["unread"]))
+        console.say(f"{about}: the motion leaves out {parts}, which the model does not know.")
     for error in quality.get("constraints") or ():
         if error["missed"]:
             turn = "" if error["mean_deg"] is None else f", {error['mean_deg']:.0f} degrees"

@@ -72,7 +72,7 @@ class MotionQuality(Result):
     flags: tuple[str, ...] = ()
     """Measures beyond their limits: floating, skating, under-floor, popping, joint-range, self-contact; off-prompt: a
     match under 0.5; constraint-missed: a constraint beyond its bar; posture-jump: a row of a timeline begins in a
-    posture that the row before does not end in."""
+    posture that the row before does not end in; part-left-out: a part of the prompt was not read."""
     ok: bool = False
     """True without flags."""
     match: PromptMatch | None = None

@@ -14,7 +14,7 @@ from marey.generation.port import Request
 from marey.motion.clip import QUALITY, MotionClip
 from marey.motion.edits.place import at_origin
 from marey.motion.feet import find_contacts, skate
-from marey.quality.record import SHOWN, Flag, MotionQuality, PromptMatch, read_quality
+from marey.quality.record import OF_PROMPT, SHOWN, Flag, MotionQuality, PromptMatch, read_quality
 from marey.quality.selection import Candidate
 
 SLIDING, TOES, JERKING = 2.0, 6.0, 0.8
@@ -46,7 +46,7 @@ def fit_candidate(clip: MotionClip, request: Request, asked: ConstraintSet, misf
         return Fitted(made, (not any(error.missed for error in errors), True, True, -misfit), request.seed)
     if asked.paths and _value(quality) < _value(drawn := read_quality(clip.manifest)) and drawn is not None:
         quality = quality.with_match(drawn.match or PromptMatch())  # a walk along a circle is a walk
-    sound = set(quality.flags) <= {Flag.OFF_PROMPT}
+    sound = set(quality.flags) <= OF_PROMPT
     quality = quality.with_constraints(errors)
     met = Flag.CONSTRAINT_MISSED not in quality.flags
     match = None if quality.match is None else quality.match.value

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.generation.carrying import WALKS, puts_load
+from marey.generation.carrying import WALKS
 from marey.generation.named import names_movement
 from marey.generation.port import Limits, Request
 from marey.generation.row_postures import is_as_alone
@@ -26,6 +26,7 @@ from marey.quality.selection import Selection
 from marey.selector.matching import side_of
 from marey.selector.records import match_of
 from marey.vocabulary.counts import stated_count
+from marey.vocabulary.loads import puts_load
 from marey.vocabulary.scope import ActionLists, match_scope, scope_of_rows
 
 KEY = "timeline"

@@ -23,7 +23,7 @@ from marey.data.sampling import classes_of
 from marey.generation.export import finish
 from marey.generation.port import Request
 from marey.models.hgm3.generate import Generator
-from marey.quality.record import SHOWN, Flag, read_quality
+from marey.quality.record import OF_PROMPT, SHOWN, read_quality
 from marey.selector.matching import Step, WantedAction, side_of
 from marey.selector.records import match_steps
 from marey.selector.rules import RULES
@@ -83,7 +83,7 @@ def self_train(
             clip = finish(generator, request, made, settings)
             quality = read_quality(clip.manifest)
             shows = (match_steps(clip, each.steps).value or 0.0) >= SHOWN
-            passed = shows and (quality is None or set(quality.flags) <= {Flag.OFF_PROMPT})
+            passed = shows and (quality is None or set(quality.flags) <= OF_PROMPT)
             asked[len(each.steps)] += 1
             obeyed[len(each.steps)] += passed
             if passed:
