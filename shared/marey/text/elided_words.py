@@ -30,6 +30,22 @@ _OTHER_SIDE = re.compile(
     (?=\W*$|;|\.|,?\ (?:and\ )?then\b|,?\ and\ (?!(?:left|right|the|then)\b)[a-z]+s\b|,\ (?!left\b|right\b))""",
     re.IGNORECASE | re.VERBOSE,
 )
+_PLACE = (
+    r"(?:(?:to|at|toward|towards|over|behind|into)\ (?!(?:and|then)\b)[\w'-]+"
+    r"(?:\ (?!(?:and|then|before|while|as)\b)[\w'-]+){0,3}?"
+    r"|straight\ (?:up|down|ahead)|up|down|left|right|ahead|forwards?|behind)"
+)
+"""Places that a hand points to."""
+_ALSO = r"(?:,?\ (?:and\ )?then\ |,\ and\ |,\ |\ and\ )"
+_PLACES_END = r"(?=\W*$|[,.;]|\ (?:and|then)\b)"
+_PLACES = re.compile(
+    rf"""\b(?P<verb>point|gesture)(?P<s>s)?
+    (?P<how>\ (?:(?:his|her|their|a|the)\ )?(?:left\ |right\ )?(?:finger|hand|arm|thumb))?
+    \ (?P<first>{_PLACE})(?P<rest>(?:{_ALSO}{_PLACE})+){_PLACES_END}""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""Places that a hand points to one after the other: "points left, at the door and up"."""
+_NEXT_PLACE = re.compile(rf"{_ALSO}(?={_PLACE}{_PLACES_END})", re.IGNORECASE)
 _READ_AS_ONE = re.compile(
     r"^(?:look|glanc|gaz|peer|peek|star|check|scan|watch|punch|jab|hook|cross|uppercut|strik|box|sway|shift|rock|dodg|duck|weav|turn"
     r"|shak|nod|wobbl|block|pac|sling|wag)",
@@ -88,7 +104,15 @@ def parts_by_sides(prompt: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
 def with_elided(prompt: str) -> str:
     """Return a prompt with the words that it leaves out: "points left, then points right" of "points left, then right",
     "stands still, then walks" of "walk start". Any other prompt is returned as it is."""
+    prompt = _PLACES.sub(_pointed_again, prompt)
     return _OTHER_SIDE.sub(_said_again, _STOPS.sub(_stopping, _STARTS.sub(_starting, prompt)))
+
+
+def _pointed_again(found: re.Match[str]) -> str:
+    """Return what a hand does, with its verb before each place."""
+    act = f"{found['verb'].lower()}{found['s'] or ''}{found['how'] or ''}"
+    first = found[0][: found.start("rest") - found.start()]
+    return first + _NEXT_PLACE.sub(f", then {act} ", found["rest"])
 
 
 def _said_again(found: re.Match[str]) -> str:

@@ -1,4 +1,4 @@
-"""The hand that has taken something, and throws it (ours)."""
+"""The hand that has taken something, and throws or uses it (ours)."""
 
 from __future__ import annotations
 
@@ -16,6 +16,34 @@ _HAND = re.compile(
 )
 _THROWN = re.compile(r"\b(?:throw|toss|hurl|lob|fling|pitch)\w* (?:it|them|the|that)\b", re.IGNORECASE)
 _SIDE = re.compile(r"\b(?:left|right|both)\b(?= (?:hand|arm))", re.IGNORECASE)
+_TAKES = re.compile(
+    r"\b(?:pick|tak|grab|lift|answer|pour|hold|fill|rais|grip|pull)\w*\b[^.;]*?"
+    r"\b(?:with|in|using) (?:(?:his|her|their|the) )?(?P<side>left|right) (?:hand|arm)\b",
+    re.IGNORECASE,
+)
+"""Words of a hand that takes a thing."""
+_USES = re.compile(
+    r"(?<=[,;.] )(?P<use>(?:(?:and|then|and then) )?(?:(?P<listen>listens?)|hangs? up|(?:slam|bang|put|set|lay|drop)s?"
+    r" (?:it|the \w+)(?: (?:down|away|back))?|takes? a (?:sip|drink|swig|bite)))(?=\W*$|[,.;]| (?:and|then)\b)",
+    re.IGNORECASE,
+)
+"""Words of what a hand does with it."""
+_PHONE = re.compile(r"\b(?:phone|telephone|receiver|smartphone|cellphone)\b", re.IGNORECASE)
+
+
+def with_hand_again(prompt: str) -> str:
+    """Return a prompt that names the hand that took a thing where the thing is used, as long as it names no other hand:
+    "answers the phone with the left hand, then hangs up with the left hand"."""
+    taken = _TAKES.search(prompt)
+    if taken is None or _HAND.search(prompt, taken.end()):
+        return prompt
+    on = " on the phone" if _PHONE.search(prompt) else ""
+    side = taken["side"].lower()
+
+    def used(found: re.Match[str]) -> str:
+        return f"{found['use']}{on if found['listen'] else ''} with the {side} hand"
+
+    return prompt[: taken.end()] + _USES.sub(used, prompt[taken.end() :])
 
 
 def with_held_hand(movements: Iterable[ReadMovement]) -> Iterator[ReadMovement]:

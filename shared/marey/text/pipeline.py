@@ -25,6 +25,7 @@ from marey.text.encoders import Encoding, TextEncoder
 from marey.text.features import TextFeatures
 from marey.text.graph import Node, SemanticGraph, build_graph
 from marey.text.guard import changed_but_aligned, changed_meaning, lost_meaning
+from marey.text.held_hand import with_hand_again
 from marey.text.in_place_words import with_plain_gait_in_place
 from marey.text.kept_texts import KeptTexts
 from marey.text.keys import NO_LABELLER, feature_key
@@ -62,7 +63,7 @@ def _in_known_words(prompt: str) -> str:
     """Return a prompt as the readers know it: in the order of time, with the words that it leaves out, without those
     that mislead them, and with plain words of ways that wind and of gaits in place."""
     said = with_known_verbs(with_plain_phrases(with_plain_stunts(without_asides(as_words(prompt)))))
-    ordered = with_elided(in_time_order(in_usual_order(said)))
+    ordered = with_hand_again(with_elided(in_time_order(in_usual_order(said))))
     return without_misleading(with_plain_gait_in_place(with_plain_zigzag(ordered)))
 
 

@@ -38,10 +38,11 @@ from marey.text.sequence_reader import (
     way_to_rest,
 )
 from marey.text.told_apart import told_apart
-from marey.vocabulary.bearing_words import BarePrompt, as_written, parts_by_gestures
+from marey.vocabulary.bearing_words import BarePrompt, as_written, parts_by_gestures, says_more
+from marey.vocabulary.bearings import FEET
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.gazes import only_gaze, stated_gaze, without_gaze
-from marey.vocabulary.lengths import stated_length
+from marey.vocabulary.lengths import is_length, stated_length
 from marey.vocabulary.scope import STANDING
 
 SURELY, SURELY_AGREED = 0.9, 0.4
@@ -99,6 +100,18 @@ def _is_list_of(first: ReadMovement) -> bool:
     form: block, punch, kick"."""
     whole, sign, _ = first.text.partition(":")
     return bool(sign) and first.action in SERIES and first.action in named_actions(whole)
+
+
+def _in_turn(before: ReadMovement, bare: BarePrompt) -> bool:
+    """Return True if what is done behind a movement of who stands has its own turn: both are acts of which one is no
+    gesture, such as feet that stamp, held arms do something else, or one has the head shaken."""
+    done = BarePrompt.of(before.text).stated
+    acts = (*done, *bare.stated)
+    held = any(each.bearing.arms and each.bearing.lasts for each in done)
+    works = held and any(each.bearing.arms for each in bare.stated)
+    works = works or any(each.bearing.work or each.bearing.gait in FEET for each in acts)
+    shakes = ("shake" in stated_gaze(before.text)) != ("shake" in stated_gaze(bare.prompt))
+    return before.action == STANDING and bool(done) and (works or shakes)
 
 
 class TrainedReaders:
@@ -307,6 +320,7 @@ class TrainedReaders:
             if only.action == STANDING:
                 return replace(ReadPrompt.of(bare.prompt, STANDING, surely=True), drawn=True)
         acts = without_gaze(bare.text)
+        acts = acts if says_more(acts) and not is_length(acts) else ""
         if not acts or (self._read_action(acts).action is None and named_actions(acts) <= {STANDING}):
             stands = not acts or not all(each.whole for each in bare.stated)
             other = self._read_action(bare.prompt).action if acts else None  # "cheer" of "cheer with arms in the air"
@@ -335,7 +349,7 @@ class TrainedReaders:
             bare = BarePrompt.of(part)
             stays = found and found[-1].action in STAYING and stated_length(found[-1].text).seconds is None
             looked = found and len(stated_gaze(found[-1].text)) > 1 and not stated_gaze(part)
-            if stays and not looked and not without_gaze(bare.text):
+            if stays and not (looked or _in_turn(found[-1], bare)) and not without_gaze(bare.text):
                 found[-1] = replace(found[-1], text=f"{found[-1].text} and {part}")
                 continue
             if not without_gaze(bare.text):

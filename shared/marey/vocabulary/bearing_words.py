@@ -19,7 +19,7 @@ from marey.vocabulary.bearing_patterns import (
     unless_beside,
     walking_forms,
 )
-from marey.vocabulary.bearings import Side, StatedBearing, each_once
+from marey.vocabulary.bearings import FEET, Side, StatedBearing, each_once
 from marey.vocabulary.counts import stated_strokes, strokes_before, strokes_behind
 from marey.vocabulary.held_poses import held_words
 from marey.vocabulary.hurt_legs import hurt_leg
@@ -103,7 +103,7 @@ _NO_ACTION = frozenset(
     ]
 )
 _DOER = re.compile(
-    r"^\W*(?:an?|the|my|his|her|this) (?:\w+ )?\w+(?:ist|er|or|ian)s?\W*$"
+    r"^\W*(?:an?|the|my|his|her|this) (?:\w+ )?\w+(?:ist|er|or|ian|[a-z]man|[a-z]woman)s?\W*$"
     r"|^\W*(?:(?:an?|the|my|his|her|our|this) )?(?:[\w-]+ )?"
     r"(?:basketball|tennis|football|soccer|volleyball|baseball|golf|hockey|badminton|rugby|cricket) "
     r"(?:player|star|pro|champion|coach|fan)s?\W*$"
@@ -119,7 +119,10 @@ _ACTS = re.compile(
 )
 _SIDE = re.compile(r"\b(left|right)\b")
 _WITH_HAND = re.compile(
-    r",? (?:with|using) (?:(?:his|her|their|its|the|one's|my|your) )?(?:left|right) (?:hand|arm|fist|thumb)\b"
+    r"(?: for (?:about )?[\w.]+ ?(?:s|secs?|seconds?))?,? (?:with|using|in|on|from|of) "
+    r"(?:(?:the |a )?(?:back|side|palm|heel|tips?|fingers?|sleeve) of )?"
+    r"(?:(?:his|her|their|its|the|one's|my|your) )?(?:left|right)[- ]"
+    r"(?:(?:index )?(?:hand|arm|fist|thumb|sleeve|palm|finger|forearm|elbow|wrist)s?)\b"
 )
 """Words of the hand that does a gesture, behind its own."""
 _WITH_BOTH = re.compile(
@@ -127,6 +130,14 @@ _WITH_BOTH = re.compile(
     r"(?! (?:up|raised|out|on|in|over|behind)\b)"
 )
 """Words of both hands, behind those of work that both do."""
+_ONLY_LENGTH = re.compile(
+    r"\W*(?:for|lasting|during) (?:about |around |some )?[\w.]+ ?(?:s|secs?|seconds?|moments?|while)\W*"
+)
+"""Words of how long something is done, and of nothing else."""
+_SHIVERS = re.compile(
+    r",? (?:and )?(?:his |her |their )?(?:whole )?(?:body )?(?:shiver|trembl|shak)\w*\b", re.IGNORECASE
+)
+"""Beginning of what is done all the while: "hugs herself, shivering"."""
 _GOES_ON = re.compile(
     r"\b(?:go|goes|going|comes?|coming) (?:back )?(?:in|inside|out|outside|through|away|upstairs|downstairs)\b"
 )
@@ -165,6 +176,10 @@ _BRINGING = frozenset(
         "swear",
         "pledge",
         "burst",
+        "slump",
+        "sag",
+        "drop",
+        "listen",
     ]
 )
 """Verbs by which arms come to where they are held: what is told before and after is done before and after."""
@@ -208,8 +223,9 @@ class _Words:
         """True if something is done in them: "salutes", "crosses his arms"; not "with his arms crossed"."""
         bearing, first = self.stated.bearing, self.stated.first
         arms = bool(bearing.arms) and not (bearing.pace or bearing.gait or bearing.roll)
+        feet = bearing.gait in FEET and first.endswith("s")
         return not (self.instead or self.stated.whole or self.own is not None) and (
-            bearing.gesture or bearing.work or (arms and first in _event_verbs())
+            bearing.gesture or bearing.work or feet or (arms and first in _event_verbs())
         )
 
 
@@ -282,12 +298,15 @@ def parts_by_gestures(prompt: str) -> tuple[str, ...]:
     "walks forward" and "salutes" of "walks forward and salutes"; none if there are no such gestures.
     """
     parts, at, last = list[str](), 0, ""
-    for each in _found(prompt):
+    found = _found(prompt)
+    events = [each.stated.bearing for each in found if each.is_event]
+    in_turn = len(events) > 1 and not all(each.gesture for each in events)
+    for each in found:
         before, behind = prompt[at : each.start], prompt[each.end :]
         if not each.is_event or _AT_ONCE.search(before) or _AT_ONCE_AFTER.match(behind):
             continue
         acts = _acts(before)
-        if not (parts or acts or _acts(behind)) or (acts and each.is_gerund and not _AND.search(before)):
+        if not (parts or acts or in_turn or _acts(behind)) or (acts and each.is_gerund and not _AND.search(before)):
             continue
         if acts:
             parts.append(prompt[at : at + _joint(before)].strip(" ,;."))
@@ -295,7 +314,11 @@ def parts_by_gestures(prompt: str) -> tuple[str, ...]:
             parts.append(prompt[each.start if acts else at : each.end].strip(" ,;."))
         at, last = each.end, each.stated.name
     rest = _JOINED.sub("", prompt[at:]).strip(" ,;.")
-    if parts and _acts(rest):
+    if len(parts) == 1 and _SHIVERS.match(prompt, at) and "shiver" in events[0].also:
+        return ()
+    if parts and _ONLY_LENGTH.fullmatch(rest):
+        parts[-1] = f"{parts[-1]} {rest}"
+    elif parts and _acts(rest):
         parts.append(rest)
     return (*parts[:1], *map(_without_joint, parts[1:])) if len(parts) > 1 else ()
 
@@ -316,7 +339,7 @@ def _acts(text: str) -> bool:
     named = named_by_adjectives().match(text.lower())
     if named is not None and named["noun"] not in verb_forms_known():
         return False
-    return _says_more(BarePrompt.of(text.strip(" ,;.")).text)
+    return says_more(BarePrompt.of(text.strip(" ,;.")).text)
 
 
 def _joint(before: str) -> int:
@@ -334,13 +357,13 @@ def _without(prompt: str, found: Sequence[_Words]) -> tuple[str, tuple[int, ...]
         whole = each.instead or each.at_once
         begin = at + _joint(prompt[at : each.start])
         ahead = each.own is not None and each.end <= each.own  # the word that joins two clauses alone
-        if each.instead or ahead or (each.at_once and _says_more(kept + prompt[at:begin])):
+        if each.instead or ahead or (each.at_once and says_more(kept + prompt[at:begin])):
             begin = each.start
         kept, places = kept + prompt[at:begin], [*places, *range(at, begin)]
         kept, places = kept + each.instead, [*places, *[each.start] * len(each.instead)]
         at = each.end
         joined = _JOINED.match(prompt[at:])
-        if joined is not None and not whole and not _says_more(kept):
+        if joined is not None and not whole and not says_more(kept):
             length = len(kept.rstrip())
             kept, places, at = f"{kept[:length]} ", [*places[:length], each.start], at + joined.end()
     return _tidied(kept + prompt[at:], [*places, *range(at, len(prompt))])
@@ -354,10 +377,10 @@ def _tidied(text: str, places: Sequence[int]) -> tuple[str, tuple[int, ...]]:
         gone = {k for found in pattern.finditer(joined) for k in range(found.start(), found.end())}
         left = [k for n, k in enumerate(left) if n not in gone]
     text, places = "".join(text[k] for k in left), tuple(places[k] for k in left)
-    return (text, places) if _says_more(text) else ("", ())
+    return (text, places) if says_more(text) else ("", ())
 
 
-def _says_more(text: str) -> bool:
+def says_more(text: str) -> bool:
     """Return True if a text names more than who acts."""
     if _GOES_ON.search(text.lower()):
         return True
@@ -504,7 +527,7 @@ def _is_beside(text: str, words: str) -> bool:
 
 def _is_subject(before: str) -> bool:
     """Return True if nothing is done in the words before those that begin to say who does it."""
-    return not _says_more(_SUBJECT.sub("", before))
+    return not says_more(_SUBJECT.sub("", before))
 
 
 def _gait(text: str, match: re.Match[str], stated: StatedBearing, load: str) -> Iterator[_Words]:
@@ -550,7 +573,7 @@ def _being(text: str, match: re.Match[str], stated: StatedBearing, instead: str)
         yield _Words(like.start(), match.end(), stated)
     elif _MANNER.match(after):
         yield _Words(*match.span(), stated)
-    elif _ACTS.match(after) and not _says_more(text[:begin]):
+    elif _ACTS.match(after) and not says_more(text[:begin]):
         yield _Words(*match.span(), stated, instead)
 
 

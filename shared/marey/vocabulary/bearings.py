@@ -1,6 +1,7 @@
 """How a prompt has the body bear itself beside its action: "like a zombie", "sadly", "with arms crossed", "salutes".
 
-The words and poses are in `bearings.toml`; `marey.vocabulary.bearing_words` finds them in a prompt.
+The words and poses are in `bearings.toml`, those of small acts of head and hands in `small_acts.toml`;
+`marey.vocabulary.bearing_words` finds them in a prompt.
 """
 
 from __future__ import annotations
@@ -31,10 +32,13 @@ Gait = Literal[
     "one-line",
     "",
 ]
+FEET: frozenset[Gait] = frozenset({"stomp", "foot-tap", "weight-shift"})
+"""Movements of the feet of who stays where they are: one of its own where a verb says so."""
 Side = Literal["left", "right", ""]
 Vector = tuple[float, float, float]
 
-_FILE, _MACROS = (Path(__file__).with_name(f"{name}.toml") for name in ("bearings", "bearing_macros"))
+_FILES = tuple(Path(__file__).with_name(f"{name}.toml") for name in ("bearings", "small_acts"))
+_MACROS = Path(__file__).with_name("bearing_macros.toml")
 
 DRAWN_AS: Mapping[str, str] = {"flinch": "flinch"}
 """Actions that are drawn as a gesture on a body that stands, since no network shows them, and that gesture."""
@@ -50,6 +54,14 @@ ARMS_HELD = frozenset({"jump", "jump-forward", "hop", "squat", "crouch", "balanc
 """Actions beside which arms can be held, and nothing else of a bearing be drawn."""
 ARMS_BUSY = frozenset({"wave", "clap", "talk", "nod", "raise-arm", "drink", "guide", "signal", "sneak"})
 """Actions in which trunk and head are free."""
+SHOWN_BY: Mapping[tuple[str, str], str] = {
+    ("happy", "jump"): "arms-jubilant",
+    ("happy", "hop"): "arms-jubilant",
+    ("happy", "jump-forward"): "arms-jubilant",
+    ("scared", "walk-backward"): "hands-warding",
+    ("angry", "stand-up"): "fists-down",
+}
+"""Arms by which a mood shows beside an action in which nothing else of it does, by the mood and the action."""
 MOVES_ON_FEET = ARMS_BUSY | frozenset(
     {"aim", "arm-circles", "bend-over", "block", "bow", "cast-spell", "cheer", "crouch", "dance", "dribble"}
     | {"fight-stance", "hop", "jump", "jump-forward", "jump-turn", "karate", "kick", "kick-ball", "pick-up", "punch"}
@@ -60,7 +72,7 @@ MOVES_ON_FEET = ARMS_BUSY | frozenset(
 Shown = Literal["body", "upper", "trunk", ""]
 """Parts of a bearing that are drawn beside an action: all, all but the legs, trunk and head alone, or none."""
 _BRINGS = re.compile(
-    r"\b(?:answers?|(?:aim|point|level|raise|shoulder|cross|fold|put|place|clasp|cover|clutch|grab|press|pick|pull|take)s?"
+    r"\b(?:answers?|(?:aim|point|level|raise|shoulder|cross|fold|put|place|clasp|cover|clutch|grab|press|pick|pull|take|slump|sag)s?"
     r"|crosses|clasps|clutches|presses|places)\b"
 )
 """Verbs, not in -ing, by which arms come to where they are held."""
@@ -114,14 +126,16 @@ class Keys:
 
     Attributes:
         times: seconds, from 0 on; the last one ends a round.
-        trunk, twist, head, sink: at these times, beside what the bearing has throughout; empty = nothing. `twist`:
-            degrees of the trunk towards its left.
+        trunk, twist, head, tilt, shrug, sink: at these times, beside what the bearing has throughout; empty = nothing.
+            `twist`: degrees of the trunk towards its left.
     """
 
     times: tuple[float, ...]
     trunk: tuple[float, ...] = ()
     twist: tuple[float, ...] = ()
     head: tuple[float, ...] = ()
+    tilt: tuple[float, ...] = ()
+    shrug: tuple[float, ...] = ()
     sink: tuple[float, ...] = ()
 
 
@@ -319,14 +333,14 @@ def bearing_macros() -> Mapping[str, str]:
 
 @lru_cache(maxsize=1)
 def bearing_table() -> Mapping[str, Any]:
-    """Return `bearings.toml`."""
-    return tomllib.loads(_FILE.read_text("utf-8"))
+    """Return the tables of all bearings, by id."""
+    return {name: values for file in _FILES for name, values in tomllib.loads(file.read_text("utf-8")).items()}
 
 
 @lru_cache(maxsize=1)
 def bearings_sha256() -> str:
-    """Return a hash of `bearings.toml` and of the words that stand for others in it."""
-    return sha256(f"{sha256_of(_FILE)}{sha256_of(_MACROS)}".encode()).hexdigest()
+    """Return a hash of the tables of all bearings and of the words that stand for others in them."""
+    return sha256("".join(map(sha256_of, (*_FILES, _MACROS))).encode()).hexdigest()
 
 
 def _bearing(name: str, values: Mapping[str, Any]) -> Bearing:

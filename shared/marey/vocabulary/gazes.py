@@ -7,9 +7,22 @@ from collections.abc import Iterator
 from itertools import groupby
 from typing import Literal, cast
 
-Glance = Literal["left", "right", "up", "down", "around", "behind", "behind_left", "behind_right", "shake"]
+Glance = Literal[
+    "left",
+    "right",
+    "up",
+    "down",
+    "around",
+    "behind",
+    "behind_left",
+    "behind_right",
+    "shake",
+    "twice_left",
+    "twice_right",
+    "twice",
+]
 """`around`: to one side and to the other; `behind`: over either shoulder, or that of a side, with the shoulders;
-`shake`: quickly to and fro."""
+`shake`: quickly to and fro; `twice`: to a side, ahead, and fast to the same side again."""
 
 _AT = (
     r"(?: (?:at|into|towards?) (?:(?:him|her|them|it|someone)"
@@ -40,6 +53,12 @@ _LOOKS = re.compile(
 )
 _STEP = re.compile(rf"(?:\s*,?\s*(?:and |then |and then )?(?:{_SIDE}))(?:{_ANY})\b(?!-)")
 _SHAKES = re.compile(r"\bshak(?:e|es|ing) (?:(?:his|her|their|the) )?head\b(?: no\b)?|\bhead[ -]shak(?:e|ing)\b")
+_TWICE = re.compile(
+    r"\b(?:(?:does|do|did|doing|makes?|making)\ (?:an?|the|his|her)\ (?:\w+\ )?)?double[- ]takes?\b"
+    r"(?:\ to\ (?:the|his|her|their)\ (?P<side>left|right))?(?:\ at\ (?:the|a|an|his|her)\ (?:\w+\ )?\w+)?"
+    r"|\blook(?:s|ing)?\ (?:away\ and\ )?(?:back\ )?twice\b"
+)
+"""A second look at once."""
 _JOINT = re.compile(
     r"(?:^|\s*[,;]|\s)\s*(?:(?:and|then|while|as|but|first)\s+)*(?:(?:an?|the)\s+(?:person|man|woman)\s+|(?:he|she|they)\s+)?"
     r"(?:(?:is|are)\s+)?(?:\w+ly\s+)?$",
@@ -87,6 +106,10 @@ def _spans(prompt: str) -> Iterator[tuple[int, int, list[Glance]]]:
     found: list[tuple[int, int, list[Glance]]] = [
         (each.start(), each.end(), ["shake"]) for each in _SHAKES.finditer(text)
     ]
+    for again in _TWICE.finditer(text):
+        found.append(
+            (again.start(), again.end(), [cast("Glance", f"twice_{again['side']}" if again["side"] else "twice")])
+        )
     for looks in _LOOKS.finditer(text):
         at, glances = looks.end(), list[Glance]()
         while (step := _STEP.match(text, at)) is not None:

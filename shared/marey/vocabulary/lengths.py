@@ -125,6 +125,9 @@ def stated_length(prompt: str) -> StatedLength:
     return StatedLength(sum(map(_seconds, found)))
 
 
+_WORD = re.compile(r"[^\W\d_]{2}")
+
+
 def only_length(prompt: str) -> float | None:
     """Return the seconds of the one length that a prompt of one movement names, wherever it stands; None = it names
     none, or several: "sprint start, then full speed, 3 seconds" has three."""
@@ -138,6 +141,16 @@ def without_length(prompt: str) -> str:
 
     Models are told how long a motion is, and make other movements of such words.
     """
+    kept = _without_lengths(prompt)
+    return kept if _WORD.search(kept) else prompt
+
+
+def is_length(text: str) -> bool:
+    """Return True if a text says how long something takes and nothing else: "for 4 seconds"."""
+    return _WORD.search(text) is not None and _WORD.search(_without_lengths(text)) is None
+
+
+def _without_lengths(prompt: str) -> str:
     kept, text = prompt, prompt.lower()
     for found in reversed(list(_LENGTH.finditer(text) if len(text) == len(prompt) else ())):
         if _is_moment(text, found):
@@ -146,8 +159,7 @@ def without_length(prompt: str) -> str:
         begin = found.start() if joint is None else joint.start()
         behind = kept[found.end() :].removeprefix(")").removeprefix(" of")
         kept = f"{kept[:begin]}{behind}" if begin else behind.lstrip(" ,;:-–—")
-    kept = kept.strip(" ,;:-–—")
-    return kept if re.search(r"[^\W\d_]{2}", kept) else prompt
+    return kept.strip(" ,;:-–—")
 
 
 def _listed(part: str) -> Iterator[str]:

@@ -73,7 +73,7 @@ def test_the_model_reads_what_is_not_drawn(reading: TextPipeline, prompt: str, r
                 ("stand still for two seconds", None),
                 ("answer the phone with the right hand", STANDS),
                 ("nod twice", None),
-                ("hang up", STANDS),
+                ("hang up with the right hand", STANDS),
             ],
         ),
         (

@@ -12,6 +12,10 @@ from marey.text.elided_words import parts_by_sides, with_elided
     [
         ("points left, then right", "points left, then points right"),
         (
+            "points to the left, at the ceiling and at himself",
+            "points to the left, then points at the ceiling, then points at himself",
+        ),
+        (
             "he waves with the left hand and then with the right",
             "he waves with the left hand, then waves with the right hand",
         ),

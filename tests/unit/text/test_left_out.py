@@ -23,7 +23,7 @@ def reading() -> TextPipeline:
     [
         ("the farmer crouches, milks the cow, then runs off", ["milks the cow"]),
         ("He kneels, shears a sheep, then walks off", ["shears a sheep"]),
-        ("old man shuffles forward, coughs, and leans on his cane", ["leans on his cane"]),
+        ("old man shuffles forward, coughs, and winds his watch", ["winds his watch"]),
         ("a pirate climbs the ladder, then hoists the sail", ["hoists the sail"]),
     ],
 )

@@ -19,6 +19,8 @@ from marey.vocabulary.gazes import only_gaze, stated_gaze, without_gaze
         ("look over the right shoulder", ("behind_right",)),
         ("turns head to look behind", ("behind",)),
         ("looks behind the sofa", ()),
+        ("does a quick double-take to the right", ("twice_right",)),
+        ("he does a double take", ("twice",)),
         ("looks to the left, then to the right", ("left", "right")),
         ("looks up at the sky and then down", ("up", "down")),
         ("look up at sky", ("up",)),

@@ -2,7 +2,7 @@
 
 import pytest
 
-from marey.vocabulary.lengths import StatedLength, only_length, stated_length, without_length
+from marey.vocabulary.lengths import StatedLength, is_length, only_length, stated_length, without_length
 from marey.vocabulary.report import ScopeReport
 from marey.vocabulary.scope import ActionLists, match_scope
 
@@ -124,3 +124,17 @@ def test_the_only_length_of_one_movement_is_its_own() -> None:
     assert only_length("sprint start then full speed, 3 seconds") == 3.0
     assert only_length("walks for 2 seconds, then runs for 3 seconds") is None
     assert only_length("walks home") is None
+
+
+@pytest.mark.parametrize(
+    ("text", "alone"),
+    [
+        ("for 4 seconds", True),
+        ("for about two seconds.", True),
+        ("waves for 4 seconds", False),
+        ("waves", False),
+        ("", False),
+    ],
+)
+def test_a_length_may_stand_alone(text: str, alone: bool) -> None:
+    assert is_length(text) is alone

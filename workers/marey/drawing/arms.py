@@ -18,6 +18,11 @@ _WAVES = {
 }
 """Azimuths and elevations of upper arm and forearm, and the swing of the forearm to each side, degrees."""
 
+_WAVES_HZ = (1.7, 2.2)
+"""Swings to and fro a second of a wave that fills a time."""
+_SWINGS_FROM = 0.7
+"""Share of the rise of the hand from which on it swings."""
+
 
 def wave(rng: random.Random) -> Gesture:
     form = rng.choices(list(_WAVES), (5, 3, 2))[0]
@@ -154,6 +159,32 @@ def clap_times(rng: random.Random, count: int, *, high: bool = False) -> Gesture
             body.hold(side, way, point, lag=0.0)
 
     return Gesture(seconds, ("clap-times",), change, BOTH, count)
+
+
+def wave_for(rng: random.Random, side: str = "", count: int | None = None, *, seconds: float) -> Gesture:
+    """A hand that goes up, waves to and fro about its elbow for all of a time, and comes down.
+
+    Args:
+        rng: decides the rest.
+        side: of the hand; empty = either.
+        count: of the swings to and fro; None = as many as fill the time.
+        seconds: to be filled, from before the hand goes up.
+    """
+    side = side or rng.choice(SIDES)
+    start, rise, fall, rests = rng.uniform(0.05, 0.1), rng.uniform(0.65, 0.75), rng.uniform(0.55, 0.65), 0.1
+    hold = max(seconds - start - rise - fall - rests, 0.8)
+    rate = count / hold if count else rng.uniform(*_WAVES_HZ)
+    arm, degrees = drawn_arm(rng, _WAVES["wave-high"]), rng.uniform(22, 32)
+    twist, sway, inward = rng.uniform(0, 5), rng.uniform(0, 3), rng.choice((-1.0, 1.0))
+
+    def change(body: StandingBody) -> None:
+        way = envelope(len(body.joints), start, rise, hold, fall)
+        phase = np.clip(np.arange(len(way)) / FPS - start - _SWINGS_FROM * rise, 0.0, None)
+        swing = inward * np.sin(2 * np.pi * rate * phase) * way**2
+        respond(body, way, side, twist, sway)
+        body.move_arm(side, way, arm.upper, swung(arm.fore, degrees * swing), 0.0)
+
+    return Gesture(start + rise + hold + fall + rests, ("wave", "wave-high"), change, side, count or 1)
 
 
 _OVERHEAD_HZ, _WILDLY_HZ = (0.95, 1.3), (1.4, 1.8)

@@ -37,6 +37,7 @@ from marey.vocabulary.bearing_words import stated_bearings
 from marey.vocabulary.bearings import (
     DRAWN_AS,
     DRAWN_ON,
+    SHOWN_BY,
     ArmPose,
     Bearing,
     Gait,
@@ -46,6 +47,7 @@ from marey.vocabulary.bearings import (
     load_bearings,
 )
 from marey.vocabulary.in_place import goes_in_place
+from marey.vocabulary.lengths import stated_length
 
 Array = NDArray[np.floating]
 Float32 = NDArray[np.float32]
@@ -196,6 +198,9 @@ def _with_drawn(stated: Sequence[StatedBearing], action: str, said: str) -> list
         stated = [each for each in stated if each.bearing.gait != "high-knees"]
     if action == "walk" and drags_feet(said):
         stated = [each for each in stated if each.bearing.gait != "shuffle"]
+    if not any(each.bearing.arms and each.bearing.lasts and not each.bearing.mood for each in stated):
+        shown = [SHOWN_BY[each.name, action] for each in stated if (each.name, action) in SHOWN_BY]
+        stated = [*stated, *map(StatedBearing, shown)]
     return [*stated, *([] if names_load else _drawn_as(action, said))]
 
 
@@ -282,9 +287,10 @@ def _drawn(
         rng = np.random.default_rng([having[0][0].seed, having[0][0].begin, len(name)])
         for span, each in having:
             if each.is_done:
-                way, done = _once(span, each, frames, fps, rng)
+                filled = _filling(span, each, fps)
+                way, done = _once(span, filled, frames, fps, rng)
                 legs = way if each.shown_in(span.action) == "body" else np.zeros(frames)
-                yield each, _Ways(way, way, legs, done, each.times or 1), rng
+                yield each, _Ways(way, way, legs, done, filled.times or 1), rng
         having = [(span, each) for span, each in having if not each.is_done]
         if not having:
             continue
@@ -327,6 +333,21 @@ def _is_at_face(bearing: Bearing) -> bool:
     return any(pose.at == "head" and not pose.path for pose in bearing.arms.values())
 
 
+def _filling(span: BorneSpan, stated: StatedBearing, fps: float) -> StatedBearing:
+    """Return a gesture that is alone in a part of a stated length with as many strokes, or held as long, as fill it."""
+    bearing, asked = stated.bearing, stated.times is not None or stated.hold_s is not None
+    if asked or not bearing.gesture or len(span.gestures) > 1 or span.action in MOVES_FIRST:
+        return stated
+    if stated_length(span.said).seconds is None:
+        return stated
+    rise = raised_s(bearing)
+    room = (span.end - span.begin) / fps - rise - (bearing.fall_s or FALL * rise) - 2 * EDGE_S
+    if not bearing.strokes_s(1):
+        return replace(stated, hold_s=max(room, bearing.hold_s[0]))
+    rounds = int((room + bearing.returns_s) / (bearing.strokes_s(2) - bearing.strokes_s(1)))
+    return replace(stated, times=max(rounds, 1))
+
+
 def _once(
     span: BorneSpan, stated: StatedBearing, frames: int, fps: float, rng: np.random.Generator
 ) -> tuple[Array, Array]:
@@ -336,7 +357,8 @@ def _once(
     Strokes are as many as are stated, and whole ones otherwise. Of gestures without strokes the number says how often
     they are made.
     """
-    bearing, at, count = stated.bearing, span.gestures.index(stated), len(span.gestures)
+    bearing, count = stated.bearing, len(span.gestures)
+    at = [each.name for each in span.gestures].index(stated.name)
     first = span.begin + (LATE * (span.end - span.begin) if span.action in MOVES_FIRST else 0.0)
     begin, end = (first + (span.end - first) * share / count for share in (at, at + 1))
     seconds, rise, hold = (end - begin) / fps, raised_s(bearing), stated.hold_s or rng.uniform(*bearing.hold_s)
@@ -414,11 +436,13 @@ class _Drawing:
             body.lean(bearing.twists * legs * self._steps(), "up")
         if bearing.head or keys.head:
             body.turn(NECK, "left", (bearing.head + self._keyed(keys.head)) * way)
+        if keys.tilt:
+            body.turn(NECK, "forward", self._keyed(keys.tilt) * way)
         if bearing.tilt:
             side = self._rng.choice([-1.0, 1.0]) if not bearing.roll_hz else -self._swung(0.7 * bearing.roll_hz)
             body.turn(NECK, "forward", bearing.tilt * way * side)
-        if bearing.shrug:
-            body.shrug(bearing.shrug * way)
+        if bearing.shrug or keys.shrug:
+            body.shrug((bearing.shrug + self._keyed(keys.shrug)) * way)
 
     def draw_arms(self) -> None:
         """Draw the swing of the arms and their poses; all of the body is drawn before."""

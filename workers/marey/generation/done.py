@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from marey.generation.gaits import STAMP_S
-from marey.vocabulary.bearings import Bearing, StatedBearing
+from marey.vocabulary.bearings import FEET, Bearing, StatedBearing
 
 BEGINS_S, FALL = 0.4, 1.15
 """Seconds before a gesture at least, and how many times as long as it rises it takes to come down."""
@@ -15,6 +15,15 @@ TOOL_S = 0.8
 """Seconds in which a tool comes to its place."""
 STROKES_RAISED_S = 0.65
 """The same of a hand that makes strokes."""
+
+FEET_S = 3.2
+"""Seconds of feet that stamp, tap or shift from one to the other, at least."""
+
+
+def feet_s(stated: StatedBearing) -> float:
+    """Return the seconds of what feet do of who stays where they are, at least; 0 of anything else, and of stamps of a
+    number."""
+    return FEET_S if stated.bearing.gait in FEET and stated.times is None else 0.0
 
 
 def raised_s(bearing: Bearing) -> float:

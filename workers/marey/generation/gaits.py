@@ -78,6 +78,8 @@ STILL = 0.15
 """Metres a second of the hips, under which a body stands."""
 SHIFTS, SHIFTS_HZ, SHIFTS_RESTS = 0.075, (0.17, 0.24), 1.8
 """Metres by which the hips of a restless body go over each foot, how often a second, and how long it rests there."""
+LEAST_SHIFTS, SHIFTS_FASTEST_HZ = 1.25, 0.42
+"""Ways over both feet and back in a motion at least, and how often a second they are made for that at most."""
 SHIFTS_SINK, SHIFTS_LEAN = 0.012, 3.0
 """Metres by which they sink on the way, and degrees by which the trunk leans back to the middle."""
 ON_LINE, ON_LINE_PASSES = 0.85, 0.6
@@ -338,7 +340,8 @@ def shifting(joints: Array, layout: FeatureLayout, begin: int, end: int, side: s
     time, body = np.arange(len(joints)) / layout.fps, StandingBody(joints)
     stands = smooth((_speed(joints, layout.fps) < STILL).astype(float), 0.2, layout.fps)
     way = _inside(len(joints), begin, end, layout.fps) * np.clip(stands, 0.0, 1.0)
-    swing = np.sin(2 * np.pi * rng.uniform(*SHIFTS_HZ) * time + rng.uniform(0, 2 * np.pi))
+    hz = max(rng.uniform(*SHIFTS_HZ), min(LEAST_SHIFTS * layout.fps / max(end - begin, 1), SHIFTS_FASTEST_HZ))
+    swing = np.sin(2 * np.pi * hz * time + rng.uniform(0, 2 * np.pi))
     over = way * np.tanh(SHIFTS_RESTS * swing) / np.tanh(SHIFTS_RESTS)
     body.shift(-SHIFTS_SINK * way * (1.0 - np.abs(over)), 0.0 * over, SHIFTS * over)
     body.lean(SHIFTS_LEAN * over, "forward")

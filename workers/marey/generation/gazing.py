@@ -28,6 +28,7 @@ DEGREES: Mapping[str, tuple[float, float, float]] = {
     "right": (-55, 0, 0),
     "up": (0, -28, 0),
     "down": (0, 32, 0),
+    "ahead": (0, 0, 0),
     "behind_left": (70, 4, 48),
     "behind_right": (-70, 4, -48),
 }
@@ -79,7 +80,8 @@ def _spans(clip: MotionClip) -> Iterator[tuple[int, int, Sequence[str], int]]:
 def _turns(glances: Sequence[str], frames: int, fps: float, rng: np.random.Generator) -> Array:
     """Return degrees (T, 3) of the head to the left and down, and of the trunk to the left."""
     first, second = rng.permutation(["left", "right"]).tolist()
-    several = {"around": (first, second), "behind": (f"behind_{first}",)}
+    twice = {f"twice_{side}": (side, "ahead", side) for side in (first, second)}
+    several = {"around": (first, second), "behind": (f"behind_{first}",), "twice": twice[f"twice_{first}"], **twice}
     ways = [way for glance in glances for way in several.get(glance, (glance,))]
     edge = round(EDGE_S * fps)
     bounds = np.linspace(edge, max(frames - edge, edge), len(ways) + 1).round().astype(int)

@@ -7,7 +7,7 @@ from typing import Any
 
 from marey.generation.asked import draws_bearings
 from marey.generation.bearing import fitting
-from marey.generation.done import BEGINS_S, done_s
+from marey.generation.done import BEGINS_S, done_s, feet_s
 from marey.generation.port import Generator, Request
 from marey.generation.wish import action_of
 from marey.text.features import TextFeatures
@@ -36,4 +36,10 @@ def _least(text: TextFeatures) -> float:
         return 0.0  # most prompts: their action need not be read
     done = fitting(stated, action_of(text))
     gestures = [seconds + 2 * BEGINS_S for each in done if (seconds := done_s(each))]
-    return max([sum(gestures), *(WORK_S for each in done if (each.bearing.work and not each.is_done) or each.ends)])
+    return max(
+        [
+            sum(gestures),
+            *map(feet_s, done),
+            *(WORK_S for each in done if (each.bearing.work and not each.is_done) or each.ends),
+        ]
+    )

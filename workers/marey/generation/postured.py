@@ -16,7 +16,7 @@ from marey.drawing.floor_ways import rolls_between, way_over_floor
 from marey.drawing.holds import BACK, FRONT, PRONE, SLIDE, SLIDES_M, SLIDES_S, passing
 from marey.drawing.passing import pose
 from marey.drawing.shots import prone_shots
-from marey.generation.done import done_s
+from marey.generation.done import done_s, feet_s
 from marey.generation.posture import RowPosture
 from marey.generation.whole_body import retimed
 from marey.motion.features import FeatureLayout, encode_all
@@ -143,7 +143,7 @@ def gestures_s(said: str) -> float:
     """Return the seconds that gestures take at least that are drawn on a body, one after the other, and work."""
     stated = stated_bearings(said)
     gestures = [seconds + EDGE_S for each in stated if (seconds := done_s(each))]
-    return max([sum(gestures), *(WORK_S for each in stated if each.bearing.work)])
+    return max([sum(gestures), *map(feet_s, stated), *(WORK_S for each in stated if each.bearing.work)])
 
 
 def _fitted(held: RowPosture, seconds: float, frames: int | None) -> Array:

@@ -17,7 +17,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.drawing.arms import clap_times, wave_overhead
+from marey.drawing.arms import clap_times, wave_for, wave_overhead
 from marey.drawing.cheers import joy_jump
 from marey.drawing.floor import sit_floor
 from marey.drawing.gesture import Gesture
@@ -41,6 +41,7 @@ from marey.generation.turning import spin_asked_for, turn_asked_for, turn_in_pla
 from marey.generation.whole_body import drawn_in_place
 from marey.motion.features import FeatureLayout, encode_all
 from marey.vocabulary.counts import stated_count
+from marey.vocabulary.lengths import stated_length
 
 Float32 = NDArray[np.float32]
 Statement = Callable[[FineWish, random.Random, float | None], Gesture | None]
@@ -82,10 +83,15 @@ def _jumps_for_joy(wish: FineWish, rng: random.Random, seconds: float | None) ->
     return joy_jump(rng, min(times, MOST_JUMPS))
 
 
-def _wave_overhead(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture | None:
+def _waves(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture | None:
     text = wish.prompt.lower()
     both = _BOTH.search(text)
-    if not both or not (_HIGH.search(text) or _WILD.search(text)) or _GOES.search(text):
+    if _GOES.search(text):
+        return None
+    asked_s = stated_length(wish.prompt).seconds
+    if asked_s is not None and not both:
+        return wave_for(rng, wish.side, wish.count, seconds=seconds or asked_s)
+    if not both or not (_HIGH.search(text) or _WILD.search(text)):
         return None
     return wave_overhead(rng, wish.count, seconds=seconds, wild=bool(_WILD.search(text)))
 
@@ -117,7 +123,7 @@ STATED: Mapping[str, Statement] = {
     "kick-ball": ball_kick_asked_for,
     "block": block_asked_for,
     "cheer": _jumps_for_joy,
-    "wave": _wave_overhead,
+    "wave": _waves,
     "sit-floor": _cross_legged,
     "kneel": lambda wish, rng, seconds: named_movement(wish, rng, seconds) or drops_asked_for(wish, rng, seconds),
     "dance": dance_asked_for,
