@@ -276,7 +276,11 @@ def _placed(
     """Return clauses with their places in time."""
     order = in_time([clause.text for clause in clauses], [clause.moves for clause in clauses])
     place_of = {number: place for place, number in enumerate(order)}
-    return [replace(clause, place=place_of.get(number, 0)) for number, clause in enumerate(clauses)]
+    placed = list[ReadClause]()
+    for number, clause in enumerate(clauses):
+        place, before = place_of.get(number, 0), max((each.place for each in placed), default=0)
+        placed.append(replace(clause, place=place, at_once=clause.at_once and place >= before))  # or it comes first
+    return placed
 
 
 def clause_inputs(

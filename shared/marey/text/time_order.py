@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
 
+from marey.text.negated_order import without_negated_order
 from marey.text.told_later import WHO, told_in_order
 from marey.vocabulary.bearings import bearing_words
 from marey.vocabulary.entries import load_vocabulary
@@ -128,7 +129,8 @@ _DOER = re.compile(
 def in_time_order(prompt: str) -> str:
     """Return a prompt with its actions in the order of time, and with the words of those that it leaves out: "claps,
     then sits down" of "before she sits down, she claps". Any other prompt is returned as it is."""
-    opened = _OPENING.sub(r"\g<opens>, \g<who> ", _without_numbers(prompt), count=1)
+    said = without_negated_order(_without_numbers(prompt))
+    opened = _OPENING.sub(r"\g<opens>, \g<who> ", said, count=1)
     text = told_in_order(_AS_SOON_AS.sub("once ", opened), _does_so)
     text = _AFTER.sub(_after, _BEFORE.sub(_before, text))
     text = _BACK_UP.sub(r"\g<rise> up", _TRIPS.sub(_trips, text))

@@ -25,6 +25,7 @@ from marey.text.sequence_reader import (
     REST_S,
     ReadMovement,
     SequenceReader,
+    _placed,
     sequence_reader,
     turned_to_carry,
     way_to_a_stop,
@@ -342,3 +343,9 @@ def test_a_way_to_idle_ends_with_a_stop() -> None:
     assert way_to_a_stop("run to idle") == "run"
     assert way_to_a_stop("walk forward to idle") == "walk forward"
     assert not way_to_a_stop("stands idle")
+
+
+def test_a_clause_that_comes_first_in_time_is_not_at_once_with_the_one_before_it() -> None:
+    clauses = [ReadClause("nod", 0.9, "he nods"), ReadClause("talk", 0.9, "after talking", at_once=True)]
+    assert [each.at_once for each in _placed(clauses, lambda *_: [1, 0])] == [False, False]
+    assert [each.at_once for each in _placed(clauses, lambda *_: [0, 1])] == [False, True]
