@@ -21,7 +21,7 @@ from marey.vocabulary.lengths import without_length
 from marey.vocabulary.scope import STANDING, every_action, match_scope
 from marey.vocabulary.word_lists import load_word_lists
 
-VERSION = 16
+VERSION = 17
 """Raise it when the same prompt, vocabulary and reader give other words."""
 MOST_WORDS = 20
 """Longer prompts tell a movement part by part: by their words, three of ten that name one action ask for another."""

@@ -46,7 +46,7 @@ from marey.vocabulary.peeks import only_peeks
 from marey.vocabulary.scope import STANDING, every_action, match_scope
 
 FILE = Path(__file__).with_name("sequence_reader.safetensors")
-VERSION = 12
+VERSION = 13
 """Raise it when the same prompt and file give other movements."""
 STATE_SCALE, VECTOR_SCALE = 6.0, 10.0
 """Factors of token states and of sentence vectors."""
