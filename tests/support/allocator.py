@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable, Iterable
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager
 
 import numpy as np
 import torch
@@ -14,8 +14,11 @@ Peak = Callable[[Callable[[], nn.Module], Callable[[nn.Module], Iterable[Tensor]
 """Measures a peak, as `peak_of_steps` does."""
 
 
-def peak_of_steps(build: Callable[[], nn.Module], parts: Callable[[nn.Module], Iterable[Tensor]]) -> int:
-    """Largest number of bytes in use during two steps of training (AdamW) on a CPU.
+def peak_of_steps(
+    build: Callable[[], nn.Module], parts: Callable[[nn.Module], Iterable[Tensor]], *, bf16: bool = False
+) -> int:
+    """Largest number of bytes in use during two steps of training (AdamW) on a CPU; with `bf16`, matrices are in
+    bfloat16.
 
     Args:
         build: makes all networks; their weights count.
@@ -23,7 +26,7 @@ def peak_of_steps(build: Callable[[], nn.Module], parts: Callable[[nn.Module], I
     """
     gc.collect()  # memory of earlier tests that is freed inside would count as less
     with torch.profiler.profile(activities=[torch.profiler.ProfilerActivity.CPU], profile_memory=True) as profile:
-        _train(build(), parts, nullcontext)
+        _train(build(), parts, lambda: torch.autocast("cpu", torch.bfloat16, enabled=bf16))
     events = profile.profiler.kineto_results.events()  # type: ignore[union-attr]
     changes = sorted((e.start_ns(), e.nbytes()) for e in events if e.name() == "[memory]")  # pyright: ignore[reportAttributeAccessIssue]
     return max(np.cumsum([change for _, change in changes]))

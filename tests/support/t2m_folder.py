@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -64,4 +65,17 @@ def write_folder(path: Path, layout: HeadingLayout = HUMANML3D_263) -> Path:
     np.save(path / "Std.npy", deviation.astype(np.float32))
     for split, names in SPLITS.items():
         (path / f"{split}.txt").write_text("\n".join(names) + "\n")
+    return path
+
+
+def write_folder_to_measure(path: Path, layout: HeadingLayout = HUMANML3D_263) -> Path:
+    """Write the folder with 39 test clips, more than a pool of the protocol: the others once more, under new names;
+    return its path."""
+    write_folder(path, layout)
+    names = [f"x{number}" for number in range(39)]
+    for number, name in enumerate(names):
+        origin = ("000002", "000003", "000004")[number % 3]
+        for part, ending in (("new_joint_vecs", "npy"), ("texts", "txt")):
+            shutil.copy(path / part / f"{origin}.{ending}", path / part / f"{name}.{ending}")
+    (path / "test.txt").write_text("\n".join(names))
     return path

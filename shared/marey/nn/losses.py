@@ -20,7 +20,8 @@ def hits(logits: Tensor, targets: Tensor) -> Tensor:
     count the lowest code alone.
     """
     first = logits == logits.amax(-1, keepdim=True)
-    return first.gather(-1, targets.clamp(min=0)[..., None]).squeeze(-1) / first.sum(-1)
+    tied = first.sum(-1, dtype=torch.int32)  # in int64 the copy that is summed is twice as large as the logits
+    return first.gather(-1, targets.clamp(min=0)[..., None]).squeeze(-1) / tied
 
 
 def ranking_loss(predicted: Tensor, losses: Tensor, masked: Tensor) -> Tensor:

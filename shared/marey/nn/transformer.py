@@ -8,6 +8,9 @@ slots) can be cut off without moving anything else.
 from __future__ import annotations
 
 import math
+from collections.abc import Generator
+from contextlib import contextmanager
+from contextvars import ContextVar
 
 import torch
 import torch.nn.functional as F
@@ -16,6 +19,18 @@ from torch import Tensor, nn
 from marey.nn.batch_threads import CALLING_THREAD, BatchThreads
 from marey.nn.packed import can_pack, pack_linears, packed_gelu
 from marey.nn.ragged import SEQUENCE_MULTIPLE, Ragged, key_bias
+
+_LIKE_A_GPU = ContextVar("like_a_gpu", default=False)
+
+
+@contextmanager
+def like_a_gpu() -> Generator[None]:
+    """Let self-attention on a CPU save for the backward pass what a GPU's fused kernel saves, to count memory."""
+    token = _LIKE_A_GPU.set(True)
+    try:
+        yield
+    finally:
+        _LIKE_A_GPU.reset(token)
 
 
 def dropout(x: Tensor, rate: float, *, training: bool) -> Tensor:
@@ -67,7 +82,8 @@ class Attention(nn.Module):
         qkv = self.qkv(x).view(batch, size, 3, self.heads, width // self.heads)
         query, key, value = qkv.permute(2, 0, 3, 1, 4)  # each (B, H, S, w / H)
         rate = self.dropout if self.training else 0.0
-        if x.device.type != "cpu":
+        if x.device.type != "cpu" or _LIKE_A_GPU.get():
+            rate = 0.0 if x.device.type == "cpu" else rate  # fused kernels of a CPU have no dropout; it saves nothing
             # Rows that are not wanted are left out before: cutting them off behind gives wrong gradients where torch
             # chooses the attention of cuDNN (2.11 with cuDNN 9.19, bfloat16 on Hopper: off by 140 %).
             query = query[:, :, :rows]

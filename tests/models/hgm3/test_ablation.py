@@ -16,9 +16,9 @@ from marey.models.hgm3 import ablation
 from marey.models.hgm3.ablation import DECODINGS, FLAT, HIERARCHICAL, TRAININGS, train_variant
 from marey.models.hgm3.assembly import assemble
 from marey.models.hgm3.conditions import LEVELS
-from marey.models.hgm3.config import TINY, MiningConfig
-from marey.models.hgm3.generate import Generator
-from marey.models.hgm3.model import SeparateTransformers
+from marey.models.hgm3.config import OPEN, STARTER, TINY, HGM3Config
+from marey.models.hgm3.generate import Generator, SamplingSettings
+from marey.models.hgm3.model import MaskedTransformer, SeparateTransformers
 from marey.models.hgm3.spec import SPEC
 from marey.models.hgm3.train import train_stage
 from marey.registry import resolve
@@ -71,7 +71,14 @@ def test_each_ablation_trains_its_networks_once_and_judges_every_row(
     # Rows of one kind differ in their settings alone, which the test of the papers' tables reads.
     monkeypatch.setattr(ablation, "ALPHAS", {"α 0 to 0.5": ablation.ALPHAS["α 0 to 0.5"]})
     monkeypatch.setattr(ablation, "PASSES", dict(list(ablation.PASSES.items())[:2]))
-    request = AblationRequest(prepared.path, str(bundle.path), tmp_path, steps=1, batch=4, threads=1)
+    measured: dict[str, tuple[type, SamplingSettings]] = {}
+
+    def protocol(generator: Generator, settings: SamplingSettings, folder: Path) -> dict[str, float]:
+        assert folder.parent == tmp_path / "protocol"
+        measured[folder.name] = (type(generator.base), settings)
+        return {"FID": 1.5}
+
+    request = AblationRequest(prepared.path, str(bundle.path), tmp_path, steps=1, batch=4, threads=1, protocol=protocol)
     trained: list[str] = []
 
     def train(*arguments: object) -> dict[str, float]:
@@ -92,17 +99,28 @@ def test_each_ablation_trains_its_networks_once_and_judges_every_row(
         shown = run(request)
         assert trained == expected[each.name]
         assert len(shown.splitlines()) == 2 + rows[each.name]
+        assert shown.count(" 1.500 |") >= rows[each.name]
         assert (tmp_path / f"{each.name}.md").read_text() == shown
         trained.clear()
         assert run(request) == shown
         assert not trained
     assert (tmp_path / "networks" / "alpha-0-0.5.0" / "bundle" / "manifest.json").is_file()
+    assert measured["conditions-full-condition-alone.0"] == (MaskedTransformer, FLAT)
+    assert measured["conditions-three-conditions-three-networks.0"] == (SeparateTransformers, HIERARCHICAL)
+    assert len(measured) == sum(rows.values()), "each row once"
 
 
-def test_the_settings_of_the_papers_tables() -> None:
-    conditions = {name: MiningConfig(**TRAININGS[name]).conditions for name in ("motion", "action", "specific", "hard")}
-    assert conditions == {"motion": "motion", "action": "action", "specific": "specific", "hard": "all"}
-    alphas = [MiningConfig(**TRAININGS[each.networks[0]]) for each in ablation.ALPHAS.values()]
+@pytest.mark.parametrize("given", [STARTER, OPEN], ids=lambda config: config.name)
+def test_the_settings_of_the_papers_tables(given: HGM3Config) -> None:
+    trained = {name: replace(given.mining, **fields) for name, fields in TRAININGS.items()}
+    alone = ("motion", "action", "specific")
+    assert {name: each.conditions for name, each in trained.items()} == {
+        name: name if name in alone else "all" for name in trained
+    }
+    assert {name: each.mask for name, each in trained.items()} == {
+        name: "random" if name == "random" else "hard" for name in trained
+    }
+    alphas = [trained[each.networks[0]] for each in ablation.ALPHAS.values()]
     assert [(each.alpha_start, each.alpha_end) for each in alphas] == [(0, 0), (0, 0.5), (0, 1), (1, 1)]
     passes = [each.settings for each in ablation.PASSES.values()]
     stages = [(s.steps, s.motion_steps, s.action_steps - s.motion_steps, s.steps - s.action_steps) for s in passes]

@@ -11,9 +11,12 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from marey.cli.main import app
+from marey.cli.roles import protocol
 from marey.core.errors import InvalidInput
 from marey.generation.candidates import best_clips
+from marey.models.hgm3 import ablation
 from marey.models.hgm3.bundle import random_bundle
+from marey.training.ablation import AblationRequest
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +43,7 @@ def test_a_report_counts_each_prompt_and_seed(bundle: str, tmp_path: Path) -> No
         (("--set", "steps=many"), "steps: 'many' is not a number"),
         (("--set", "wings=2"), "unknown setting 'wings' of tiny"),
         (("--set", "steps=101"), "steps: 101 is outside 1 to 100"),
+        (("--set", "motion_steps=11"), "must not decrease: motion_steps 11, action_steps"),
         (("--prompts", "own"), "there is no set 'own'"),
         (("--steers", "2"), "has no live sessions"),
     ],
@@ -55,6 +59,23 @@ def test_an_ablation_that_a_model_has_not_is_told_with_those_it_has(bundle: str,
     assert done.exit_code == InvalidInput.exit_code
     assert "has no ablation 'depth'" in done.stderr
     assert "masks (Hard and random masks" in done.stderr
+
+
+def test_an_evaluator_measures_the_rows_of_an_ablation(
+    bundle: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def measure_rows(data: Path, evaluator: str, repeats: int) -> Any:
+        return lambda generator, settings, folder: {"FID": len(evaluator) + repeats, "data": str(data)}
+
+    def ablate(request: AblationRequest) -> str:
+        return str(request.measured(generator=None, settings=None, about="row"))
+
+    monkeypatch.setattr(protocol, "measure_rows", measure_rows)
+    monkeypatch.setattr(ablation, "ablate_passes", ablate)
+    words = ["train", "ablate", "data", bundle, "-o", str(tmp_path), "--what", "passes"]
+    done = CliRunner().invoke(app, [*words, "--evaluator", "judge", "--repeats", "3"])
+    assert done.stdout.strip() == "{'FID': 8, 'data': 'data'}", done.output
+    assert CliRunner().invoke(app, words).stdout.strip() == "{}"
 
 
 def test_actions_are_measured_by_their_held_out_prompts(bundle: str, tmp_path: Path) -> None:

@@ -183,6 +183,17 @@ def test_other_numbers_of_steps_keep_the_shares_of_the_conditions() -> None:
     assert (config.steps, config.motion_steps, config.action_steps) == (20, 4, 10)
 
 
+def test_ends_of_the_conditions_are_settings_that_must_not_decrease(generator: Generator) -> None:
+    asked = [Request(text_features(0), 1, 196)]
+    ends = generator.settings({"steps": 10, "motion_steps": 10, "action_steps": 10})
+    made = generator.generate(asked, ends)[0]
+    assert made is not None
+    assert made.decided[1:] == (0, 0), "the prompt as a whole alone"
+    for values in ({"motion_steps": 6}, {"action_steps": 11}):
+        with pytest.raises(InvalidInput, match="must not decrease: motion_steps"):
+            generator.settings(values)
+
+
 def test_the_same_seed_gives_the_same_random_bundle(tmp_path: Path) -> None:
     a, b, c = (random_bundle(tmp_path / name, seed=seed) for name, seed in (("a", 0), ("b", 0), ("c", 1)))
     assert a.manifest.random

@@ -125,10 +125,24 @@ def test_the_papers_tables_train_both_networks_and_judge_the_bundle(
 ) -> None:
     judge_by_two_prompts(monkeypatch)
     monkeypatch.setattr(ablation, "LEVELS", {name: LEVELS[name] for name in ("1 levels", "2 levels")})
-    request = AblationRequest(prepared.path, str(options.run / "bundle"), tmp_path, steps=1, batch=4, threads=1)
+    measured: list[str] = []
+
+    def protocol(generator: Generator, settings: object, folder: Path) -> dict[str, float]:
+        assert settings == generator.settings({})
+        measured.append(folder.name)
+        return {"FID": float(generator.config.tokenizer.levels)}
+
+    request = AblationRequest(
+        prepared.path, str(options.run / "bundle"), tmp_path, steps=1, batch=4, threads=1, protocol=protocol
+    )
     shown = ablate_levels(request)
+    assert measured == ["levels-1-levels.0", "levels-2-levels.0"]
+    with pytest.raises(InvalidInput, match="trains no generator"):
+        ablate_tokenizer(request)
     head, _, *rows = shown.splitlines()
-    assert {"local_mm", "error_mm", "validation loss", "foot skate"} <= {cell.strip() for cell in head.split("|")}
+    assert {"local_mm", "error_mm", "validation loss", "foot skate", "FID"} <= {
+        cell.strip() for cell in head.split("|")
+    }
     assert [row.split(" | ")[0] for row in rows] == ["| 1 levels", "| 2 levels"]
     for number, levels in enumerate((1, 2)):
         made = find_bundle(str(tmp_path / f"levels-{number}-0" / "bundle"))

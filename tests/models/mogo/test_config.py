@@ -17,6 +17,8 @@ def test_paper_is_what_the_paper_gives_and_nothing_of_ours() -> None:
     assert (t.levels, t.codes, t.code_width, t.scale) == (6, 8192, 128, "elementwise")
     assert (t.rotation_weight, t.position_weight, t.velocity_weight, t.world_weight) == (1, 0, 0, 0)
     assert (PAPER.ahead, PAPER.steers, PAPER.rollouts, PAPER.first_level) == ((), 0, 0, 1)
+    assert (PAPER.crops, STARTER.crops, TINY.crops) == (0, 0.4, 0.4)
+    assert "crops" not in STARTER.to_dict(), "earlier releases read the bundle"
     assert (PAPER.transformer.level_gain, PAPER.transformer.joint, PAPER.depth.layers) == (False, False, 0)
     assert (PAPER.condition.every_frame, PAPER.condition.clock, PAPER.condition.noise) == (False, False, 0)
     assert PAPER.train_tokenizer.ema == PAPER.train_transformer.ema == 0

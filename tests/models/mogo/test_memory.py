@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -123,11 +124,29 @@ def test_the_estimate_is_within_a_tenth_of_what_is_used(layers: int, width: int,
     assert estimate.total == pytest.approx(found, rel=0.1), dict(estimate.parts)
 
 
+@pytest.mark.parametrize("bf16", [False, True], ids=["float32", "bfloat16"])
+@pytest.mark.parametrize(
+    ("layers", "width", "codes", "samples"),
+    [(5, 96, 500, 4), (3, 128, PAPER.tokenizer.codes, 2)],
+    ids=["layers", "codes"],
+)
+def test_layers_that_are_computed_again_are_estimated_in_both_number_types(
+    layers: int, width: int, codes: int, samples: int, bf16: bool
+) -> None:
+    config = small(layers, width)
+    config = replace(config, tokenizer=replace(config.tokenizer, codes=codes))
+    found = measured(config, samples, recompute=True, peak=partial(peak_of_steps, bf16=bf16))
+    estimate = memory_model(config, bf16=bf16).estimate(samples, recompute=True)
+    assert estimate.total == pytest.approx(found, rel=0.1), dict(estimate.parts)
+    assert ("behind the layers" in estimate.parts) == (codes > 500)
+
+
 @pytest.mark.gpu
 @on_a_gpu
-def test_the_estimate_at_the_published_size_is_within_a_tenth_of_what_a_gpu_uses() -> None:
-    found = measured(PAPER, 4, recompute=False, peak=peak_on_gpu)
-    estimate = memory_model(PAPER).estimate(4)
+@pytest.mark.parametrize(("samples", "recompute"), [(4, False), (16, True)])
+def test_the_estimate_at_the_published_size_is_within_a_tenth_of_what_a_gpu_uses(samples: int, recompute: bool) -> None:
+    found = measured(PAPER, samples, recompute=recompute, peak=peak_on_gpu)
+    estimate = memory_model(PAPER).estimate(samples, recompute=recompute)
     assert estimate.total == pytest.approx(found, rel=0.1), dict(estimate.parts)
 
 

@@ -152,6 +152,7 @@ def test_a_model_that_does_not_split_prompts_learns_joined_clips_as_one_sample(s
     for seed in range(20):
         span = samples.of_clip(joined, np.random.default_rng(seed))
         assert not span.seam
+        assert (span.skipped, span.frames) == (0, min(int(given.lengths[joined]), given.most)), "no crop unasked"
         assert first <= span.before == span.after < first + int(given.captions.authors[joined].sum())
     _, frames = samples.captioned_actions(np.array([joined]))
     assert set(frames.tolist()) == {int(given.lengths[joined])}
@@ -168,6 +169,7 @@ def test_a_single_act_has_one_of_its_captions_and_is_sometimes_cut(stage: Transf
     assert any(not s.skipped for s in found)
     assert all(s.first == start + s.skipped for s in found)
     assert all(s.ends == (s.skipped + s.frames == length) for s in found)
+    assert stage.samples.crops == TINY.crops == 0.4
 
 
 def test_a_stretch_that_is_too_long_loses_its_end_and_a_seam_behind_it() -> None:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from marey.data.manifest import Clip, Measured
+from marey.data.sampling import UNLABELLED
 from marey.evaluator.labels import label_ids, label_of
 
 MEASURED = Measured(seconds=1, path=1, turn=0, speed=1, steps=1, side="")
@@ -48,6 +49,13 @@ def test_clips_with_their_sources_own_words_are_told_apart_by_them() -> None:
     )
     assert label_of(dance) != label_of(dribble)
     assert label_of(clip(acts=("walk",), sides=())) == "walk, active"
+
+
+def test_clips_of_published_sets_answer_their_own_captions_alone() -> None:
+    unknown: dict[str, Any] = {"acts": (UNLABELLED,), "sides": (), "dataset": "humanml3d", "content": UNLABELLED}
+    labels = {label_of(clip(**unknown, id=name)) for name in ("000021", "M000021", "000021#1")}
+    assert labels == {"humanml3d: 000021", "humanml3d: M000021", "humanml3d: 000021#1"}
+    assert label_of(clip(**unknown | {"dataset": "cmp"}, id="000021")) not in labels
 
 
 def test_equal_labels_have_equal_numbers() -> None:

@@ -67,6 +67,7 @@ def test_a_negative_of_the_same_label_is_left_out() -> None:
     assert float(info_nce(text, motion, labels, 1.0)) == pytest.approx((2 * pair + lone) / 3)
     unmasked = info_nce(text, motion, torch.tensor([0, 1, 2]), 1.0)
     assert float(unmasked) > float(info_nce(text, motion, labels, 1.0)) + 0.2
+    assert float(info_nce(text, motion, None, 1.0)) == float(unmasked)
 
 
 def test_a_batch_of_one_label_alone_teaches_nothing_and_breaks_nothing() -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -20,7 +19,7 @@ from marey.cli.roles.tokenizers import tokenizer_of
 from marey.core.errors import InvalidFile, InvalidInput
 from marey.core.settings import settings
 from marey.data.prepared import PreparedData
-from marey.data.t2m_folder import HUMANML3D_SET, prepare_t2m
+from marey.data.t2m_folder import HUMANML3D_SET
 from marey.evaluator.loading import load_evaluator
 from marey.evaluator.metrics.distribution import fid
 from marey.evaluator.protocol import Judge, ProtocolOptions, Subject, run_protocol
@@ -28,13 +27,10 @@ from marey.evaluator.protocol.metrics import METRICS
 from marey.evaluator.protocol.report import document_of, markdown_of, published_rows
 from marey.evaluator.protocol.samples import draw_samples
 from marey.evaluator.reconstruction import rebuilt
-from marey.evaluator.t2m_import import import_t2m
 from marey.generation.port import Generated, Generator
-from marey.importing import ImportRequest
 from marey.models.hgm3.bundle import random_bundle
 from marey.models.hgm3.generate import Generator as HGM3
-from tests.support.t2m_evaluator import SMALL, write_public_files
-from tests.support.t2m_folder import write_folder
+from tests.support.protocol import data_to_measure, small_evaluator
 from tests.support.texts import shared_pipeline
 from tests.support.tiny_encoders import write_tiny_distilbert
 from tests.support.tmr_download import write_tmr_download
@@ -44,25 +40,12 @@ SIZES = ProtocolOptions(repeats=2, pool=4, many=5, prompts=2, pairs=3)
 
 @pytest.fixture(scope="module")
 def data(tmp_path_factory: pytest.TempPathFactory) -> PreparedData:
-    """HumanML3D's layout with 39 test clips: those of training once more, under other names."""
-    folder = tmp_path_factory.mktemp("protocol")
-    published = write_folder(folder / "published")
-    names = [f"x{number}" for number in range(39)]
-    for number, name in enumerate(names):
-        for part, ending in (("new_joint_vecs", "npy"), ("texts", "txt")):
-            origin = ("000002", "000003", "000004")[number % 3]
-            shutil.copy(published / part / f"{origin}.{ending}", published / part / f"{name}.{ending}")
-    (published / "test.txt").write_text("\n".join(names))
-    prepare_t2m(HUMANML3D_SET, published, folder / "data")
-    return PreparedData.open(folder / "data")
+    return data_to_measure(tmp_path_factory.mktemp("protocol"), HUMANML3D_SET)
 
 
 @pytest.fixture(scope="module")
 def t2m(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
-    folder = tmp_path_factory.mktemp("t2m")
-    request = ImportRequest("t2m-evaluator", write_public_files(folder / "files"), folder / "t2m-small", "none")
-    import_t2m(request, SMALL)
-    return Bundle.open(folder / "t2m-small")
+    return small_evaluator(tmp_path_factory.mktemp("t2m"))
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +58,7 @@ def subject(tmp_path_factory: pytest.TempPathFactory) -> Subject:
     bundle = random_bundle(tmp_path_factory.mktemp("generator") / "random-tiny")
     generator = HGM3.load(bundle, device="cpu", dtype=torch.float32)
     settings = {"steps": 2, "motion_steps": 0, "action_steps": 0}
-    return Subject(generator, shared_pipeline(), settings, tokenizer_of(bundle))
+    return Subject(generator, shared_pipeline(), generator.settings(settings), tokenizer_of(bundle))
 
 
 def test_each_clip_is_drawn_once_with_one_of_its_captions_at_a_multiple_of_four_frames(data: PreparedData) -> None:

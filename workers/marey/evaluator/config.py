@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from marey.core.configs import Count, ModelConfig, Positive, Share, Weight, named
+from marey.core.configs import ADDED, Count, ModelConfig, Positive, Share, Weight, named
 from marey.core.errors import InvalidInput
 from marey.motion.features import layout
 from marey.training.config_checks import check_heads
@@ -31,6 +31,8 @@ class LossConfig:
     latent: Weight = 1e-5  # λ_E
     contrast: Weight = 0.1  # λ_NCE
     temperature: Positive = 0.1  # of InfoNCE: TMR's, the appendix does not give one
+    spare_same_label: bool = field(default=True, metadata=ADDED)
+    """Ours: motions of the pair's own label are no negatives of InfoNCE; else all others of the batch are."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +74,7 @@ class EvaluatorConfig(ModelConfig):
         return self.network.width
 
 
-PAPER = EvaluatorConfig()
+PAPER = EvaluatorConfig(loss=LossConfig(spare_same_label=False))
 
 STARTER = EvaluatorConfig(
     name="starter",

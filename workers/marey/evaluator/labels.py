@@ -7,7 +7,9 @@ contradict. Numbers in some captions (steps, metres, degrees) are not part of a 
 which the clips do not carry: there labels are coarser than the finest captions, so that no correct answer counts as
 wrong. They are finer than captions without a style, one in seven of those of one action and a third of the sequences':
 there an answer in another style counts as wrong.
-another style counts as wrong there.
+
+Clips of published sets have captions and no actions: the label of each is its own, so that only the clip itself answers
+its captions, as in the papers.
 """
 
 from __future__ import annotations
@@ -19,15 +21,19 @@ from numpy.typing import NDArray
 
 from marey.data.describe import STYLE_NAMES
 from marey.data.manifest import Clip
+from marey.data.sampling import UNLABELLED
 
 FREE_TEXT = "cmu"
 """Action of clips with free-text captions: their content distinguishes them."""
 
 
 def label_of(clip: Clip) -> str:
-    """Return a clip's label: `raise left, active`; `bow + turn right, normal` for a sequence."""
+    """Return a clip's label: `raise left, active`; `bow + turn right, normal` for a sequence; `humanml3d: 000021` where
+    the actions are not known."""
     if clip.acts == (FREE_TEXT,):
         return f"{clip.dataset}: {clip.content}"
+    if UNLABELLED in clip.acts:
+        return f"{clip.dataset}: {clip.id}"
     sides = clip.sides or ("",) * len(clip.acts)
     acts = [f"{act} {side}".strip() for act, side in zip(clip.acts, sides, strict=True)]
     return f"{' + '.join(acts)}, {STYLE_NAMES.get(clip.style, clip.style) or 'normal'}"

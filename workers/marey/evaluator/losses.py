@@ -42,16 +42,18 @@ def latent_distance(motion: Gaussian, text: Gaussian) -> Tensor:
     return F.smooth_l1_loss(text.mean.float(), motion.mean.float())
 
 
-def info_nce(text: Tensor, motion: Tensor, labels: Tensor, temperature: float) -> Tensor:
+def info_nce(text: Tensor, motion: Tensor, labels: Tensor | None, temperature: float) -> Tensor:
     """Return L_NCE on cosines of embeddings (B, E), text to motion and back, without negatives of equal meaning.
 
     TMR drops negatives whose sentences another language model finds similar; here clips have labels (B,), and negatives
-    of the pair's own label are dropped.
+    of the pair's own label are dropped. Labels None: none is dropped.
     """
     with torch.autocast(text.device.type, enabled=False):  # in bfloat16 cosines over 0.1 are off by up to 0.04
         cosines = F.normalize(text.float(), dim=1) @ F.normalize(motion.float(), dim=1).T
-        same = labels[:, None] == labels[None]
-        same.fill_diagonal_(False)
-        scores = (cosines / temperature).masked_fill(same, -torch.inf)
+        scores = cosines / temperature
+        if labels is not None:
+            same = labels[:, None] == labels[None]
+            same.fill_diagonal_(False)
+            scores = scores.masked_fill(same, -torch.inf)
         target = torch.arange(len(scores), device=scores.device)
         return 0.5 * (F.cross_entropy(scores, target) + F.cross_entropy(scores.T, target))

@@ -16,6 +16,7 @@ from marey.checks.quality import Quality
 from marey.core.errors import InvalidBundle, NotFound
 from marey.core.validation import first_problem
 from marey.data.manifest import Clip
+from marey.data.sampling import UNLABELLED
 from marey.evaluator.labels import label_ids, label_of
 from marey.evaluator.measuring import check
 
@@ -77,7 +78,8 @@ class ReferenceSplit:
     @property
     def labels(self) -> NDArray[np.int64]:
         """Return numbers (N,), equal for equal labels, as the metrics take them."""
-        return label_ids([clip.label for clip in self.clips])
+        # References of earlier releases have one label for all clips of published sets.
+        return label_ids([clip.id if UNLABELLED in clip.acts else clip.label for clip in self.clips])
 
     @classmethod
     def of(cls, clips: Sequence[ReferenceClip], motion: NDArray[np.float32]) -> ReferenceSplit:

@@ -48,8 +48,10 @@ def spec_of(encoder: TextEncoder) -> TextSpec:
 
 
 def token_states(encoder: TextEncoder, sentences: Sequence[str]) -> list[Tensor]:
-    """Return (S, W) float16 of each sentence."""
-    return [torch.from_numpy(encoding.tokens).half() for encoding in encoder.encodings(sentences)]
+    """Return (S, W) float16 of each sentence, the same inside a training step in bfloat16 as outside."""
+    with torch.autocast("cpu", enabled=False):  # states in bfloat16 have no numpy array
+        encodings = encoder.encodings(sentences)
+    return [torch.from_numpy(encoding.tokens).half() for encoding in encodings]
 
 
 def padded(states: Sequence[Tensor], device: torch.device) -> tuple[Tensor, Tensor]:

@@ -144,13 +144,14 @@ class TMRStage:
     def _terms(self, batch: CaptionedBatch) -> dict[str, Tensor]:
         """Return the loss and its terms (App. B.2); latents are samples in training, means in validation."""
         weights = self.config.loss
+        labels = batch.labels if weights.spare_same_label else None
         motion = _in_pieces(self.module.motion, batch.features, batch.lengths)
         text = _in_pieces(self.module.text, batch.states, batch.words)
         terms = {
             "reconstruction": self._reconstruction(batch, (motion, text)),
             "divergence": divergences(motion, text),
             "latent": latent_distance(motion, text),
-            "contrast": info_nce(text.mean, motion.mean, batch.labels, weights.temperature),
+            "contrast": info_nce(text.mean, motion.mean, labels, weights.temperature),
         }
         loss = terms["reconstruction"] + weights.contrast * terms["contrast"]
         loss = loss + weights.divergence * terms["divergence"] + weights.latent * terms["latent"]

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import mean, stdev
+from typing import Any
 
 from marey.checks.prompts import evaluation_prompts
 from marey.checks.rates import mean_quality
@@ -35,6 +36,8 @@ class AblationRequest:
         seeds: training seeds of each variant; see `compare`.
         threads: 0 = PyTorch's default.
         other: prepared data that an ablation of data adds; None = none.
+        protocol: measures a generator with its settings, in a folder of its own, by the published protocol; None = rows
+            hold no such numbers.
     """
 
     data: Path
@@ -45,6 +48,13 @@ class AblationRequest:
     seeds: int = 1
     threads: int = 0
     other: Path | None = None
+    protocol: Callable[[Generator[Any], Any, Path], Mapping[str, float]] | None = None
+
+    def measured(self, generator: Generator[S], settings: S, about: str) -> Mapping[str, float]:
+        """Return the numbers of the published protocol of a row, named `about` below the output folder."""
+        if self.protocol is None:
+            return {}
+        return self.protocol(generator, settings, self.output / "protocol" / about)
 
     def training(self, run: Path, config: C, seed: int) -> TrainOptions[C]:
         """Return the options of the training of a variant."""
@@ -87,7 +97,7 @@ def compare(
     (output / name).mkdir(parents=True, exist_ok=True)
 
     def add(variant: str, seed: int) -> None:
-        file = output / name / f"{re.sub('[^a-z0-9]+', '-', variant.lower()).strip('-')}.{seed}.json"
+        file = output / name / f"{file_name(variant)}.{seed}.json"
         if not file.is_file():
             text = json.dumps(dict(measured(variant, seed)), indent=1)
             temporary = file.with_suffix(".part")
@@ -103,6 +113,11 @@ def compare(
         add(variant, seeds)
     (output / f"{name}.json").write_text(json.dumps(results, indent=1), encoding="utf-8")
     return table(results)
+
+
+def file_name(row: str) -> str:
+    """Return the name of a row in names of files."""
+    return re.sub("[^a-z0-9]+", "-", row.lower()).strip("-")
 
 
 def touching(results: Mapping[str, Sequence[Mapping[str, float]]], metric: str = DECIDES) -> list[str]:

@@ -31,6 +31,7 @@ from marey.generation.port import Generator, Request, S
 from marey.generation.shots.dispatch import generate_any, resolve_request
 from marey.motion.clip import MotionClip
 from marey.text.features import TextFeatures
+from marey.text.keys import as_served
 from marey.text.pipeline import TextPipeline
 
 
@@ -183,12 +184,17 @@ def finished(generator: Generator[S], requests: Sequence[Request], settings: S) 
         yield finish(generator, request, made, settings)
 
 
-def pipeline_of(generator: Generator[Any]) -> TextPipeline:
-    """Return the text pipeline of a bundle. Raises InvalidBundle if the bundle declares none."""
+def pipeline_of(generator: Generator[Any], *, served: bool = False) -> TextPipeline:
+    """Return the text pipeline of a bundle; if `served`, with the rewriter of the settings, as workers read prompts.
+
+    Raises:
+        InvalidBundle: the bundle declares none.
+        InvalidInput: the rewriter lacks its settings.
+    """
     text = generator.bundle.manifest.text
     if text is None:
         raise InvalidBundle("declares no text pipeline", where=str(generator.bundle.path))
-    return TextPipeline.load(text)
+    return TextPipeline.load(as_served(text) if served else text)
 
 
 def judge_bundle(

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,6 +17,7 @@ import torch
 from torch import Tensor, nn
 
 from marey.core.errors import InvalidInput
+from marey.nn.transformer import like_a_gpu
 from marey.training.optimisation import StageConfig
 
 GIB = 2**30
@@ -24,8 +25,10 @@ ROOM = 0.92
 """Share of a device's memory that is planned for; the rest is for its context and fragments."""
 WORKING = 2
 """Working memory of the backward pass, in largest saved tensors of a part."""
-AGAIN = 0.2
-"""The same while a layer is computed again, in what it saves."""
+AGAIN, AGAIN_BF16 = 0.2, 0.55
+"""The same while a layer is computed again, in what it saves: with matrices in bfloat16 half of the work is still done
+in float32."""
+BF16 = "bfloat16"
 
 
 @dataclass(frozen=True)
@@ -198,7 +201,10 @@ class MemoryModel:
             return MemoryEstimate(samples, recompute, {**parts, "working memory": working})
         parts["inputs of the layers"] = samples * self.layers * self.carried
         head = working + sum(amount.at(0, samples) for amount in self.saved.values())
-        layer = (1 + AGAIN) * sum(amount.layer + samples * amount.both for amount in self.saved.values())
+        again = AGAIN
+        if BF16 in self.saved:  # autocast keeps its copies of all weights until the forward pass ends
+            head, again = head + self.layers * self.saved[BF16].layer, AGAIN_BF16
+        layer = (1 + again) * sum(amount.layer + samples * amount.both for amount in self.saved.values())
         parts["one layer, computed again" if layer > head else "behind the layers"] = max(head, layer)
         return MemoryEstimate(samples, recompute, parts)
 
@@ -248,6 +254,11 @@ def device_memory(device: torch.device) -> int:
             "the memory of this device is not known", where="--micro-batch", hint="Name a number."
         ) from None
     return 1024 * int(found.split()[1])
+
+
+def counted_for(device: torch.device) -> AbstractContextManager[object]:
+    """Return the context in which a forward pass on this processor saves what it would save on a device."""
+    return nullcontext() if device.type == "cpu" else like_a_gpu()
 
 
 @contextmanager

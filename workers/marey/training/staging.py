@@ -27,7 +27,7 @@ from marey.nn.devices import choose_device, fast_bf16
 from marey.nn.growing import grow, take
 from marey.training.budget import Budget
 from marey.training.loop import RunOptions, train
-from marey.training.memory import MemoryModel, device_memory
+from marey.training.memory import MemoryModel, counted_for, device_memory
 from marey.training.optimisation import StageConfig
 from marey.training.parts import TrainedPart, load_part, load_sources, save_part
 from marey.training.stages import TrainingStage
@@ -96,7 +96,8 @@ def fit_micro_batch(options: TrainOptions[C], memory: MemoryOf[C]) -> TrainOptio
     if options.micro_batch != "auto":
         return options
     device = choose_device(options.device)
-    model = memory(options.config, bf16=options.bf16 and fast_bf16(device))
+    with counted_for(device):
+        model = memory(options.config, bf16=options.bf16 and fast_bf16(device))
     samples = model.fit(device_memory(device), recompute=options.recompute).samples
     log.info("samples of a pass", stage=model.stage, samples=samples, batch=model.batch)
     return dataclasses.replace(options, micro_batch=samples)

@@ -338,6 +338,16 @@ def ablate(
     other: Annotated[
         Path | None, typer.Option("--with", help="Prepared data of which --what data adds 0, 50 and 100 %.")
     ] = None,
+    evaluator: Annotated[
+        str | None,
+        typer.Option(
+            "--evaluator",
+            help="Bundle that also measures FID, Top-1 and MM-Dist of each row, by the published protocol.",
+        ),
+    ] = None,
+    repeats: Annotated[
+        int, typer.Option("--repeats", min=2, help="Generations of the test captions, for --evaluator.")
+    ] = 20,
     threads: Threads = 0,
 ) -> None:
     """Train variants of a model, and measure what each of its parts is worth. Called again, it goes on."""
@@ -345,6 +355,7 @@ def ablate(
 
     console.result(
         training.ablate(
-            what, data, bundle, output, steps=steps, batch=batch, seeds=seeds, threads=threads, other=other
+            what, data, bundle, output, steps=steps, batch=batch, seeds=seeds, threads=threads, other=other,
+            evaluator=evaluator, repeats=repeats,
         ).rstrip("\n")
     )  # fmt: skip

@@ -60,21 +60,26 @@ def estimate_memory(
 
     Args:
         samples: of a pass; "auto" = as many as fit; None = the whole batch.
-        gigabytes: memory for "auto"; None = that of this device.
+        gigabytes: memory of a GPU for "auto"; None = that of this device.
 
     Returns:
         stage, samples a pass, samples of a batch, and GiB of each part and their sum.
     """
     assert training.memory is not None  # else there is no such command
     with extra("train"):
+        import torch
+
         from marey.nn.devices import choose_device
         from marey.training.config_file import open_config
-        from marey.training.memory import GIB, device_memory
+        from marey.training.memory import GIB, counted_for, device_memory
 
         named_config, memory_model = resolve(training.config), resolve(training.memory)
-    model = memory_model(open_config(named_config, config), bf16=bf16)
+    chosen = open_config(named_config, config)
+    here = choose_device("auto") if samples == "auto" and gigabytes is None else torch.device("cuda")
+    with counted_for(here):
+        model = memory_model(chosen, bf16=bf16)
     if samples == "auto":
-        room = device_memory(choose_device("auto")) if gigabytes is None else 1e9 * gigabytes
+        room = device_memory(here) if gigabytes is None else 1e9 * gigabytes
         found = model.fit(room, recompute=recompute)
     else:
         found = model.estimate(samples or model.batch, recompute=recompute)
@@ -175,12 +180,15 @@ def ablate(
     seeds: int,
     threads: int,
     other: Path | None = None,
+    evaluator: str | None = None,
+    repeats: int = 20,
 ) -> str:
     """Train and measure variants of a bundle's model; a Markdown table.
 
     Args:
         name: of the ablation; None = the only one of the model.
         other: prepared data that the ablation `data` adds.
+        evaluator: also measures the variants by the published protocol, `repeats` times.
 
     Raises:
         InvalidInput: the model has no such ablation, or several and none is named.
@@ -206,4 +214,9 @@ def ablate(
         from marey.training.ablation import AblationRequest
 
         run = resolve(known[name].run)
-    return run(AblationRequest(data, bundle, output, steps, batch, seeds, threads, other))
+    protocol = None
+    if evaluator is not None:
+        from marey.cli.roles.protocol import measure_rows
+
+        protocol = measure_rows(data, evaluator, repeats)
+    return run(AblationRequest(data, bundle, output, steps, batch, seeds, threads, other, protocol))

@@ -65,7 +65,8 @@ def measured_rows(found: Mapping[str, Any]) -> tuple[TableRow, ...]:
     """Return the rows of a run (`run_protocol`), evaluator by evaluator, with intervals over its repeats."""
     repeats: Sequence[Mapping[str, Any]] = found["repeats"]
     generator = found["generator"]
-    names = {"real": REAL_NAME, "reconstructed": f"{generator}, tokenizer alone", "generated": generator}
+    made = f"{generator} with {_rewriter(found)}" if "rewriter" in found else generator
+    names = {"real": REAL_NAME, "reconstructed": f"{generator}, tokenizer alone", "generated": made}
     rows: list[TableRow] = []
     for evaluator in found["evaluators"]:
         for kind in repeats[0][evaluator]:
@@ -95,6 +96,13 @@ def markdown_of(found: Mapping[str, Any]) -> str:
         f"{options['prompts']} captions with {options['many']} motions each. Published sizes are 20 repeats, pools of "
         "32, and 30 motions of 96 captions.",
     ]
+    if "rewriter" in found:
+        captions, rewritten = (sum(each[name] for each in found["read"]) for name in ("captions", "rewritten"))
+        lines += [
+            "",
+            f"{rewritten} of {captions} captions, counted in each repeat, were rewritten by {_rewriter(found)}; the "
+            "others were read as written.",
+        ]
     for evaluator in found["evaluators"]:
         rows = [row for row in _rows(found) if _beside(row, evaluator, found)]
         lines += ["", f"## By `{evaluator}`", "", *_table(rows)]
@@ -104,6 +112,11 @@ def markdown_of(found: Mapping[str, Any]) -> str:
             "The papers' rows are by the T2M evaluator, which did not measure here: none compares with these.",
         ]
     return "\n".join(lines) + "\n"
+
+
+def _rewriter(found: Mapping[str, Any]) -> str:
+    rewriter = found["rewriter"]
+    return f"{rewriter['name']} ({rewriter['model']})" if rewriter["model"] else rewriter["name"]
 
 
 def _rows(found: Mapping[str, Any]) -> tuple[TableRow, ...]:

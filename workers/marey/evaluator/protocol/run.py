@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from itertools import islice
 from pathlib import Path
@@ -64,22 +64,42 @@ class Judge:
 
 @dataclass
 class Subject:
-    """A generator with what reads its prompts, and its tokenizer, in evaluation mode; None = it has none."""
+    """A generator with what reads its prompts, its settings as it takes them, and its tokenizer, in evaluation mode;
+    None = it has none."""
 
     generator: Generator[Any]
     pipeline: TextPipeline
-    settings: Mapping[str, float]
+    settings: Any
     tokenizer: MotionTokenizer | None = None
     _read: dict[str, TextFeatures] = field(default_factory=dict[str, TextFeatures])
+
+    @property
+    def rewriter(self) -> dict[str, str | None]:
+        """Return name and language model of what rewrites captions before they are read; nothing if none does."""
+        spec = self.pipeline.spec
+        return {} if spec.rewriter == "none" else {"name": spec.rewriter, "model": spec.rewriter_model}
+
+    def rewritten(self, captions: Sequence[str]) -> dict[str, int]:
+        """Count captions, and those that were rewritten; the others were read as written.
+
+        Raises:
+            InvalidInput: none was: the row would not be of the rewriter.
+        """
+        self._parse(captions)
+        read = [self._read[caption] for caption in dict.fromkeys(captions)]
+        kept = [each.not_rewritten for each in read if each.not_rewritten is not None]
+        if len(kept) == len(read):
+            name = self.rewriter["name"]
+            raise InvalidInput(f"the rewriter {name!r} rewrote no caption: {kept[0]}", where="MAREY_REWRITER")
+        return {"captions": len(read), "rewritten": len(read) - len(kept)}
 
     def generate(self, asked: Sequence[tuple[str, int, int]]) -> Iterator[NDArray[np.float32]]:
         """Yield the features (T, D) of each (caption, frames, seed)."""
         self._parse([caption for caption, *_ in asked])
-        settings = self.generator.settings(self.settings)
         rest = iter(asked)
         while part := list(islice(rest, self.generator.batch)):
             requests = [Request(self._read[caption], seed, frames) for caption, frames, seed in part]
-            for made in self.generator.generate(requests, settings):
+            for made in self.generator.generate(requests, self.settings):
                 assert made is not None  # no rows are dropped here
                 yield made.features
 
@@ -121,9 +141,8 @@ class _Run:
                 "layout": self.data.manifest.layout,
             },
             "generator": None if generator is None else generator.bundle.reference,
-            "settings": {}
-            if subject is None or generator is None
-            else generator.describe_settings(generator.settings(subject.settings)),
+            "settings": {} if subject is None or generator is None else generator.describe_settings(subject.settings),
+            **({"rewriter": subject.rewriter} if subject is not None and subject.rewriter else {}),
             "evaluators": [judge.evaluator.name for judge in self.judges],
             "rows": self._rows,
             "options": {name: value for name, value in asdict(self.options).items() if name != "repeats"},
@@ -140,31 +159,34 @@ class _Run:
     def key(self) -> str:
         return hashlib.sha256(json.dumps(self.about, sort_keys=True).encode()).hexdigest()
 
-    def repeat(self, number: int, progress: Progress) -> Rows:
-        """Return the rows of a repeat: read if it was done before, else measured and written."""
+    def repeat(self, number: int, progress: Progress) -> dict[str, Any]:
+        """Return a repeat, with its `rows`: read if it was done before, else measured and written."""
         file = self.folder / f"repeat-{number:02}.json"
         try:
             stored: Any = read_json(file)
         except NotFound:
-            rows = self._measure(number, progress)
-            write_atomically(file, json.dumps({"key": self.key, "rows": rows}, indent=1).encode())
-            return rows
+            measured = {"key": self.key, **self._measure(number, progress)}
+            write_atomically(file, json.dumps(measured, indent=1).encode())
+            return measured
         if not isinstance(stored, dict) or "rows" not in stored:
             raise InvalidFile("is not a repeat of the protocol", where=str(file), hint="Remove it.")
         if stored.get("key") != self.key:
             hint = "Name another folder, or remove this one."
             raise InvalidInput("is of another generator, evaluator, data or options", where=str(file), hint=hint)
-        return stored["rows"]
+        return stored
 
-    def _measure(self, number: int, progress: Progress) -> Rows:
+    def _measure(self, number: int, progress: Progress) -> dict[str, Any]:
         options = self.options
         drawing, pooling = (
             np.random.default_rng(child) for child in np.random.SeedSequence([options.seed, number]).spawn(2)
         )
         samples = draw_samples(self.data, options.split, options.pool, drawing)
         motions = [sample.motion for sample in samples]
+        subject, read = self.subject, {}
+        if subject is not None and subject.rewriter:
+            read = {"read": subject.rewritten([sample.caption for sample in samples])}
         made, many = self._generate(samples, drawing, progress)
-        through = [] if self.subject is None else self.subject.reconstruct(motions)
+        through = [] if subject is None else subject.reconstruct(motions)
         rows: Rows = {}
         for judge in self.judges:
             evaluator, state = judge.evaluator, pooling.bit_generator.state
@@ -180,7 +202,7 @@ class _Run:
                 variety = measure_variety(evaluator.embed_motion(many), options.many, options.pairs, pooling)
                 found[GENERATED]["mmodality"] = variety
             rows[evaluator.name] = found
-        return rows
+        return {"rows": rows, **read}
 
     def _generate(
         self, samples: Sequence[Sample], rng: np.random.Generator, progress: Progress
@@ -235,7 +257,8 @@ def run_protocol(
         for number in range(options.repeats)
     ]
     kinds = {judge.evaluator.name: judge.kind for judge in judges}
-    return run.about | {"kinds": kinds, "repeats": repeats, "metrics": list(METRICS)}
+    found = run.about | {"kinds": kinds, "repeats": [each["rows"] for each in repeats], "metrics": list(METRICS)}
+    return found | ({"read": [each["read"] for each in repeats]} if "rewriter" in found else {})
 
 
 def _check_layouts(run: _Run) -> None:

@@ -24,7 +24,7 @@ from marey.models.hgm3.generate import Generator, SamplingSettings
 from marey.models.hgm3.model import SeparateTransformers
 from marey.models.hgm3.train import train_stage
 from marey.text.features import TextFeatures
-from marey.training.ablation import AblationRequest, compare, evaluation_texts, judge
+from marey.training.ablation import AblationRequest, compare, evaluation_texts, file_name, judge
 from marey.training.motions import TOKENS
 from marey.training.optimisation import with_batch
 from marey.training.staging import TrainOptions
@@ -49,18 +49,23 @@ class DecodedVariant:
     settings: SamplingSettings = HIERARCHICAL
 
 
+SHARED: dict[str, Any] = {"conditions": "all", "mask": "hard"}
+"""Fields of `MiningConfig` that every training sets: those of bundles differ, and rows must not."""
 TRAININGS: dict[str, dict[str, Any]] = {
-    "hard": {"mask": "hard"},
-    "random": {"mask": "random"},
-    "motion": {"conditions": "motion"},
-    "action": {"conditions": "action"},
-    "specific": {"conditions": "specific"},
-    "alpha-0-0": {"mask": "hard", "alpha_start": 0.0, "alpha_end": 0.0},
-    "alpha-0-0.5": {"mask": "hard", "alpha_start": 0.0, "alpha_end": 0.5},
-    "alpha-0-1": {"mask": "hard", "alpha_start": 0.0, "alpha_end": 1.0},
-    "alpha-1-1": {"mask": "hard", "alpha_start": 1.0, "alpha_end": 1.0},
+    name: SHARED | fields
+    for name, fields in {
+        "hard": {},
+        "random": {"mask": "random"},
+        "motion": {"conditions": "motion"},
+        "action": {"conditions": "action"},
+        "specific": {"conditions": "specific"},
+        "alpha-0-0": {"alpha_start": 0.0, "alpha_end": 0.0},
+        "alpha-0-0.5": {"alpha_start": 0.0, "alpha_end": 0.5},
+        "alpha-0-1": {"alpha_start": 0.0, "alpha_end": 1.0},
+        "alpha-1-1": {"alpha_start": 1.0, "alpha_end": 1.0},
+    }.items()
 }
-"""Trained masked transformers, by name: fields of `MiningConfig` that differ from the bundle's."""
+"""Trained masked transformers, by name: fields of `MiningConfig`; all others are the bundle's."""
 
 MASKS = {
     f"{mask} masks, {name}": DecodedVariant((mask,), settings)
@@ -157,6 +162,8 @@ def ablate(name: str, variants: Mapping[str, DecodedVariant], request: AblationR
         if len(generators) > 1:
             generator.base = SeparateTransformers([each.networks.masked for each in generators])
         validation = json.loads((folders[-1] / METRICS).read_text(encoding="utf-8"))
-        return {"validation loss": validation["reconstruction/specific"]} | judge(generator, texts(), variant.settings)
+        judged = judge(generator, texts(), variant.settings)
+        protocol = request.measured(generator, variant.settings, f"{name}-{file_name(row)}.{seed}")
+        return {"validation loss": validation["reconstruction/specific"], **judged, **protocol}
 
     return compare(list(variants), measured, request.output, name, seeds=request.seeds)

@@ -102,8 +102,8 @@ class InferenceConfig:
     """Decoding (HGM³ Sec. 3.4)."""
 
     steps: Steps = 10  # L, passes of the base level
-    motion_steps: Whole = 2  # L_M, the last pass with the motion node alone
-    action_steps: Whole = 5  # L_A, the last pass without specific nodes
+    motion_steps: Annotated[int, SPEC.range_of("motion_steps")] = 2  # L_M, the last pass with the motion node alone
+    action_steps: Annotated[int, SPEC.range_of("action_steps")] = 5  # L_A, the last pass without specific nodes
     guidance: Guidance = 4.0  # weight of the prompt at the base level; 1 = none
     temperature: Temperature = 1.0  # randomness of the base level; 0 = the likeliest token
     top_k: TopK = 0.1  # share of the codes that may be drawn
@@ -111,6 +111,15 @@ class InferenceConfig:
     residual_temperature: Temperature = 1.0
     residual_top_k: TopK = 0.1
     drawing: Drawing = 1  # 1 = bundles that draw have rules draw movements; 0 = the network makes all
+
+    def check(self) -> None:
+        """Check that no stage ends before the one ahead of it. Raises InvalidInput."""
+        if not self.motion_steps <= self.action_steps <= self.steps:
+            raise InvalidInput(
+                f"must not decrease: motion_steps {self.motion_steps}, action_steps {self.action_steps}, "
+                f"steps {self.steps}",
+                where="inference",
+            )
 
 
 @dataclass(frozen=True)
@@ -178,13 +187,7 @@ class HGM3Config(ModelConfig):
         check_windows(self.windows, self.tokenizer.frames_per_token)
         for name in ("masked", "predictor", "residual"):
             check_heads(name, getattr(self, name).heads, getattr(self, name).width)
-        inference = self.inference
-        if not inference.motion_steps <= inference.action_steps <= inference.steps:
-            raise InvalidInput(
-                f"must not decrease: motion_steps {inference.motion_steps}, action_steps {inference.action_steps}, "
-                f"steps {inference.steps}",
-                where="inference",
-            )
+        self.inference.check()
 
 
 PAPER = HGM3Config(condition=ConditionConfig(standardised=False))

@@ -49,17 +49,18 @@ class SamplingSettings(Sampling[InferenceConfig]):
         """Return the bundle's decoding settings with this batch's changes; stage boundaries scale with the steps.
 
         Raises:
-            InvalidInput: a value out of range.
+            InvalidInput: a value out of range, or a boundary behind the next.
         """
         config = super().inference(default)
-        if config.steps == default.steps:
-            return config
-        share = config.steps / default.steps
-        return replace(
-            config,
-            motion_steps=round(config.motion_steps * share) if self.motion_steps is None else config.motion_steps,
-            action_steps=round(config.action_steps * share) if self.action_steps is None else config.action_steps,
-        )
+        if config.steps != default.steps:
+            share = config.steps / default.steps
+            config = replace(
+                config,
+                motion_steps=round(config.motion_steps * share) if self.motion_steps is None else config.motion_steps,
+                action_steps=round(config.action_steps * share) if self.action_steps is None else config.action_steps,
+            )
+        config.check()
+        return config
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,8 @@ The same prompt, seed, settings and bundle give the same motion.""",
     load="marey.models.hgm3.generate:Generator.load",
     settings=(
         Setting("steps", 1, 100, 10, "Passes of the base level; fewer are faster.", whole=True),
+        Setting("motion_steps", 0, 100, 2, "The last pass by the prompt as a whole alone; 0 = none.", whole=True),
+        Setting("action_steps", 0, 100, 5, "The last pass without what is said of each action.", whole=True),
         Setting("guidance", 0.0, 100.0, 4.0, "Weight of the prompt at the base level; 1 = none."),
         Setting("temperature", 0.0, 100.0, 1.0, "Randomness of the base level; 0 = the likeliest token."),
         Setting("top_k", 0.001, 1.0, 0.1, "Share of the codes that the base level may draw."),

@@ -28,7 +28,7 @@ from marey.models.mogo.config import MOGOConfig
 from marey.models.mogo.generate import Generator
 from marey.models.mogo.train import train_stage, transformer_stage
 from marey.nn.scaled_quantizer import Scale
-from marey.training.ablation import AblationRequest, compare, evaluation_texts, judge
+from marey.training.ablation import AblationRequest, compare, evaluation_texts, file_name, judge
 from marey.training.mixing import mix_with_texts
 from marey.training.optimisation import with_batch
 from marey.training.staging import TrainOptions, finish, use_threads
@@ -146,7 +146,14 @@ def judged(bundle: Bundle, threads: int) -> dict[str, float]:
 
 
 def ablate_tokenizer(request: AblationRequest) -> str:
-    """Compare the scales of MoSA; see `_ablate`."""
+    """Compare the scales of MoSA; see `_ablate`.
+
+    Raises:
+        InvalidInput: an evaluator is named: no motions are generated.
+    """
+    if request.protocol is not None:
+        hint = "Compare by `scaling`, or leave it out."
+        raise InvalidInput("the ablation 'tokenizer' trains no generator", where="--evaluator", hint=hint)
     return _ablate("tokenizer", SCALES, train_tokenizer, request)
 
 
@@ -205,6 +212,10 @@ def _ablate(
         run = request.output / f"{about}-{list(variants).index(name)}-{seed}"
         shutil.rmtree(run, ignore_errors=True)
         run.mkdir(parents=True)
-        return train(variants[name], request.training(run, config, seed))
+        found = train(variants[name], request.training(run, config, seed))
+        if request.protocol is None:
+            return found
+        generator = Generator.load(str(run / "bundle"), threads=request.threads)
+        return found | dict(request.measured(generator, generator.settings({}), f"{about}-{file_name(name)}.{seed}"))
 
     return compare(list(variants), measured, request.output, about, seeds=request.seeds)

@@ -123,6 +123,8 @@ class MOGOConfig(ModelConfig):
     rollouts: Whole = (
         0  # further ones that start from the model's own motions, where training starts from a finished one
     )
+    crops: Share = field(default=0.4, metadata=ADDED)
+    """Ours: share of the training samples that begin in motion, as a stream past its window does."""
     split_actions: bool = field(default=True, metadata=ADDED)
     """Ours: each action of a prompt is drawn by itself, one after another (`TextSpec.split_actions`); else the sentence
     is the prompt of all frames, as published."""
@@ -168,7 +170,11 @@ class MOGOConfig(ModelConfig):
 
 # The paper generates up to 260 frames of cyclic motions (Sec. 5).
 PAPER = MOGOConfig(
-    longest_frames=260, split_actions=False, float_logits=True, condition=ConditionConfig(standardised=False)
+    longest_frames=260,
+    crops=0.0,
+    split_actions=False,
+    float_logits=True,
+    condition=ConditionConfig(standardised=False),
 )
 PAPER_KIT = replace(PAPER, name="paper-kit", layout="kit-251", features=251, joints=21, fps=12.5)
 """`paper` on KIT-ML."""

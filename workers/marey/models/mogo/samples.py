@@ -25,8 +25,6 @@ from marey.training.sentences import SentenceData
 MIN_FRAMES = 16
 BEFORE_SEAM = 4
 """Smallest number of frames before a seam, so that there is a prompt to replace."""
-CROPPED = 0.4
-"""Share of the samples that are cropped."""
 STEERED = 0.5
 """Share of the samples of joined clips that have two actions."""
 ANYTIME = 0.35
@@ -96,6 +94,7 @@ class Samples:
         most: int,
         *,
         split: bool = True,
+        crops: float = 0.0,
     ) -> None:
         """Collect the sources.
 
@@ -106,9 +105,11 @@ class Samples:
             steers: motions that are steered at any moment.
             most: frames of the longest sample.
             split: the actions of joined clips are samples of their own; else a clip is one with the whole caption.
+            crops: share of the samples that begin in motion.
         """
         self.seams = [clip.seams if split else () for clip in clips]
         self.clips, self.captions, self.most, self.steers = clips, captions, most, steers
+        self.crops = crops
         self.lengths = tokens.lengths[:, 0].cpu().numpy()
         self._starts = tokens.starts[:, 0].cpu().numpy()
         self._steered_from = len(tokens.tokens)
@@ -190,7 +191,7 @@ class Samples:
 
     def _cut(self, whole: TokenSpan, rng: np.random.Generator) -> TokenSpan:
         """Crop some spans, and cut all to the longest length."""
-        if rng.random() < CROPPED:
+        if rng.random() < self.crops:
             last = whole.seam - BEFORE_SEAM if whole.seam else whole.frames - MIN_FRAMES
             if last > 0:
                 whole = whole.cropped(int(rng.integers(1, last + 1)))

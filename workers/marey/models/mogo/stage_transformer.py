@@ -41,7 +41,9 @@ class TransformerStage:
         self.optimisation = config.train_transformer
         self.module = build_transformer(config).to(tokens.tokens.device)
         self.pairs = Pairs(clips, tokens, captions, MIN_FRAMES)
-        self.samples = Samples(clips, tokens, captions, steers, config.max_frames, split=config.split_actions)
+        self.samples = Samples(
+            clips, tokens, captions, steers, config.max_frames, split=config.split_actions, crops=config.crops
+        )
         spoken = captions.sentence[captions.captions_of(self.pairs.train.tolist())]
         if config.condition.standardised:
             mean, std = text_statistics(captions.strings, spoken)

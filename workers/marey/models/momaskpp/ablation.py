@@ -25,7 +25,7 @@ from marey.models.momaskpp.generate import Generator
 from marey.models.momaskpp.scales import Scales
 from marey.models.momaskpp.train import train_stage
 from marey.text.features import TextFeatures
-from marey.training.ablation import AblationRequest, compare, evaluation_texts, judge
+from marey.training.ablation import AblationRequest, compare, evaluation_texts, file_name, judge
 from marey.training.motions import TOKENS
 from marey.training.optimisation import with_batch
 from marey.training.staging import TrainOptions
@@ -96,7 +96,9 @@ def ablate(name: str, variants: Mapping[str, NetworkVariant], stages: tuple[str,
         found = {"tokens of the longest motion": float(Scales.of(own).total(own.max_tokens))}
         found |= train_variant(request.bundle, stages, request.training(run, own, seed))
         generator = Generator.load(str(run / "bundle"), threads=request.threads)
-        return found | judge(generator, texts(), generator.settings({}))
+        settings = generator.settings({})
+        protocol = request.measured(generator, settings, f"{name}-{file_name(row)}.{seed}")
+        return found | judge(generator, texts(), settings) | dict(protocol)
 
     return compare(list(variants), measured, request.output, name, seeds=request.seeds)
 
