@@ -28,6 +28,7 @@ NAMING = {
     "workers/marey/evaluator/protocol/published.toml": "rows of the papers' tables",
     "tests/unit/evaluator/test_protocol.py": "reads these rows",
     "tests/acceptance/test_published_data.py": "trains both models of the papers on their data sets",
+    "tests/acceptance/test_published_sizes.py": "trains both models of the papers at their sizes",
 }
 """Files that name a model, with the reason."""
 SKIPPED = (".md", ".lock", ".png", ".jpg", ".svg", ".safetensors", ".npz", ".gz", ".bvh", ".csv", ".tsv", ".woff2")
