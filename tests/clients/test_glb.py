@@ -6,17 +6,20 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
-import numpy as np
 import pytest
 
 from marey.exporters import Coordinates, exporter_of
 from marey.motion.io.glb_write import write_glb
 from tests.support.clients import blender, node
-from tests.support.exported import CLIPS
+from tests.support.exported import CLIPS, LONG
+from tests.support.opened import opened_in_blender, opened_in_three
 
 pytestmark = pytest.mark.slow
 
+ALL = CLIPS | LONG
+NAMES = list(ALL)
 VARIANTS = {"plain": {}, "root bone": {"root_bone": True}, "T-pose": {"tpose_frame": True, "root_bone": True}}
 VARIANTS |= {"body": {"mesh": True}, "body and root bone": {"mesh": True, "root_bone": True}}
 
@@ -37,27 +40,28 @@ def test_the_validator_of_khronos_has_nothing_to_say(name, variant, tmp_path):
     assert {(each["code"], each["severity"]) for each in messages} <= {("UNUSED_OBJECT", 2)}, "there is no mesh"
 
 
-@pytest.mark.parametrize("name", CLIPS)
+@pytest.mark.parametrize("name", NAMES)
 def test_three_puts_every_joint_where_the_npz_has_it(name, tmp_path):
-    clip = CLIPS[name]
+    clip = ALL[name]
     write_glb(tmp_path / "a.glb", clip)
-    seen = node("three_glb.mjs", "three", tmp_path / "a.glb")
-    order = [seen["names"].index(joint) for joint in clip.skeleton.joint_names]
-    joints = np.array(seen["joints"])[:, order]
-    assert joints.shape == clip.joints.shape
-    assert np.linalg.norm(joints - clip.joints, axis=-1).max() < 1e-3
-    np.testing.assert_allclose(seen["times"], np.arange(clip.frames) / clip.fps, atol=1e-5)
-    assert seen["extras"]["manifest"] == json.loads(json.dumps(clip.manifest))
+    seen = opened_in_three(tmp_path / "a.glb")
+    seen.check(clip.skeleton.joint_names, clip.joints, clip.fps)
+    assert seen.extras["manifest"] == json.loads(json.dumps(clip.manifest))
 
 
-@pytest.mark.parametrize("name", CLIPS)
-def test_blender_puts_every_joint_where_the_npz_has_it(name, tmp_path):
-    clip = CLIPS[name]
-    write_glb(tmp_path / "a.glb", clip)
-    blender("blender_glb.py", tmp_path / "a.glb", tmp_path / "seen.npz")
-    with np.load(tmp_path / "seen.npz") as seen:
-        order = [list(seen["names"]).index(joint) for joint in clip.skeleton.joint_names]
-        assert seen["joints"][:, order].shape == clip.joints.shape
-        assert np.linalg.norm(seen["joints"][:, order] - clip.joints, axis=-1).max() < 1e-3
-        np.testing.assert_allclose(seen["times"], np.arange(clip.frames) / clip.fps, atol=1e-3)
-        assert seen["rest"][:, 1].min() == pytest.approx(0, abs=1e-4), "the toes are on the floor at rest"
+@pytest.fixture(scope="module")
+def imported(tmp_path_factory) -> Path:
+    """All files, seen by Blender; one process, because it takes seconds to start."""
+    folder = tmp_path_factory.mktemp("blender")
+    for number, name in enumerate(NAMES):
+        write_glb(folder / f"{number}.glb", ALL[name])
+    blender("blender_motions.py", folder, "import_scene.gltf")
+    return folder
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_blender_puts_every_joint_where_the_npz_has_it(name, imported):
+    clip, seen = ALL[name], opened_in_blender(imported / f"{NAMES.index(name)}.npz")
+    seen.check(clip.skeleton.joint_names, clip.joints, clip.fps)
+    assert seen.empties == 0, "every joint is a bone"
+    assert seen.rest[:, 1].min() == pytest.approx(0, abs=1e-4), "the toes are on the floor at rest"

@@ -53,7 +53,7 @@ def test_transforms_are_those_of_ufbx(order, tmp_path):
 
 def test_a_motion_is_where_blender_has_it(tmp_path):
     shutil.copy(archive("rigs/91_48.fbx"), tmp_path / "a.fbx")
-    blender("blender_fbx.py", tmp_path, "wm.fbx_import")
+    blender("blender_motions.py", tmp_path, "wm.fbx_import")
     clip = read_fbx(tmp_path / "a.fbx")
     with np.load(tmp_path / "a.npz") as seen:
         order = [list(seen["names"]).index(joint) for joint in clip.skeleton.joint_names]

@@ -47,7 +47,7 @@ def python(variable: str, script: str, *arguments: object) -> str:
     program = os.environ.get(variable)
     if not program:
         pytest.skip(f"{variable} names no Python")
-    return _run([program, str(SCRIPTS / script), *map(str, arguments)], 120)
+    return _run([program, str(SCRIPTS / script), *map(str, arguments)], 600)
 
 
 def node(script: str, package: str, *arguments: object) -> Any:

@@ -35,3 +35,7 @@ CLIPS = {
     "tumbling KIT joints": tumbling(KIT, 12.5),
     "tumbling SnapMoGen joints": tumbling(SNAPMOGEN, 30),
 }
+
+RATES = {"24": 24.0, "25": 25.0, "30": 30.0, "60": 60.0, "23.976": 24000 / 1001}
+LONG = {f"10 s at {name} fps": walker(seconds=10, fps=fps, turn=0.3) for name, fps in RATES.items()}
+"""Walks at the rates that studios ask for, long enough that an error of time would grow to more than a millimetre."""

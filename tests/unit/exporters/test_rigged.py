@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -35,3 +36,10 @@ def test_its_former_place_still_has_it() -> None:
     from marey.motion import retarget
 
     assert retarget.write_rigged is write_rigged
+
+
+@pytest.mark.parametrize("rig", ["mixamo", "ue4", "humanik"])
+def test_rotations_of_a_glb_pass_one_by_no_rounding(rig: str) -> None:
+    data = exporter_of("glb").write(CLIP, Coordinates(rig=rig))
+    document = json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")])
+    assert max(abs(number) for node in document["nodes"] for number in node["rotation"]) <= 1

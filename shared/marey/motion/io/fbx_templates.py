@@ -81,8 +81,8 @@ _MESH = [
 _LAMBERT = [
     ("ShadingModel", "string", "Lambert"),
     ("MultiLayer", "bool", (0,)),
-    ("AmbientColor", "color", (0.2, 0.2, 0.2)),
-    ("DiffuseColor", "color", (0.8, 0.8, 0.8)),
+    ("AmbientColor", "Color", (0.2, 0.2, 0.2)),
+    ("DiffuseColor", "Color", (0.8, 0.8, 0.8)),
     ("DiffuseFactor", "number", (1,)),
 ]
 TEMPLATES: dict[str, tuple[str, Iterable[tuple[str, str, tuple[float, ...] | str]]]] = {
@@ -96,7 +96,7 @@ TEMPLATES: dict[str, tuple[str, Iterable[tuple[str, str, tuple[float, ...] | str
 """Class and properties of the template of an object type."""
 _WHOLE = {"bool", "enum", "int", "Visibility Inheritance"}
 _LONG = {"time", "ulonglong"}
-_ANIMATABLE = {"number", "Visibility"}
+_ANIMATABLE = {"number", "Visibility", "Color"}
 
 
 def prop(name: str, kind: str, values: Iterable[float] | str, flags: str | None = None) -> FbxNode:

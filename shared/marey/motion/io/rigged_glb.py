@@ -70,7 +70,7 @@ def _nodes(rig: Rig) -> list[dict[str, Any]]:
         node: dict[str, Any] = {
             "name": name,
             "translation": floats(rig.offsets[joint] / units[joint]),
-            "rotation": floats(rig.local_rotations[joint][[1, 2, 3, 0]]),
+            "rotation": floats(rig.local_rotations[joint][[1, 2, 3, 0]].clip(-1, 1)),  # rounding passes 1 by a bit
         }
         if abs(scales[joint] - 1) > SAME:
             node["scale"] = [float(scales[joint])] * 3
