@@ -1,4 +1,5 @@
-"""Turn a model's features into a finished clip: decode, solve onto the body, resample, clean the feet, solve again.
+"""Turn a model's features into a finished clip: decode, solve onto the body, resample, clean the feet, solve again,
+and turn the toes and hands.
 
 A layout with the rotations of its skeleton (`PosedLayout`) gives the pose itself: nothing is solved from positions, and
 after the clean-up only the bones that it moved are turned.
@@ -14,6 +15,7 @@ from marey.motion.body import NamedBody, standard_body, travel_scale
 from marey.motion.bones import bone_fit
 from marey.motion.carrying import carrying_contacts
 from marey.motion.clip import MotionClip
+from marey.motion.ends import turn_ends
 from marey.motion.features import FeatureLayout, PosedLayout
 from marey.motion.feet import clean_feet, find_contacts, need_feet, rule_for
 from marey.motion.hands import clear_arms, join_hands, wrist_distance
@@ -41,7 +43,8 @@ def finish_motion(
     The pose is solved on the skeleton of the training data, which the model learned, and turned to rotations, unless
     the layout holds them; the body takes those, and its travel is scaled by the length of its legs. Feet are cleaned at
     the rate of the output, after resampling, so that they stand still there too; hands that meet are brought as near as
-    they were decoded, and arms out of the body; the second solution is exact.
+    they were decoded, and arms out of the body; the second solution is exact. Toes and hands, whose turns no joint
+    shows, are turned at the end (`marey.motion.ends`).
 
     Args:
         features: (Tf, D) as generated, not normalized.
@@ -76,6 +79,8 @@ def finish_motion(
             rotations, root = _solve(joints, skeleton, rate)
     else:
         contacts = find_contacts(joints, skeleton, rate)
+    if not isinstance(layout, PosedLayout):  # its features turn every joint
+        rotations = turn_ends(rotations, root, contacts, skeleton, rate)
     return MotionClip.of(
         skeleton,
         rotations,

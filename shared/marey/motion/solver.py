@@ -8,7 +8,8 @@ Positions determine where bones point, not how they twist. The twist is decided 
 use
   that of other moments, and without any, a neutral swing;
 - joints between two rigid bodies (the spine) share the twist between those evenly;
-- every other joint swings the shortest way from its parent; a joint without children does not turn.
+- elbows and knees swing from half a bend of their hinge, every other joint from its parent, the shortest way; a joint
+  without children does not turn (`ends.py` turns toes and hands of finished clips).
 
 Each bone is aimed from its joint's solved position at its child's target, so that errors of bone lengths do not add up
 along a limb.
@@ -52,6 +53,9 @@ from marey.motion.skeleton import Skeleton
 # the opposite direction, where the shortest swing is not defined, is out of reach (up and back, behind the body).
 NEUTRAL_ARM = np.array([0.5, -0.6, 0.6])
 NEUTRAL_LEG = np.array([0.1, -0.8, 0.6])
+HALF_BENT = np.radians(80.0)
+"""Bend from which elbows and knees swing, the middle of what they can reach: from a straight one the shortest way to a
+folded one is nearly half a turn, and not defined."""
 BEND_SEEN = 0.15  # sine of the bend at which a bend plane has half its weight (9 degrees)
 
 
@@ -266,9 +270,17 @@ class _Swings(_Group):
         super().__init__(solver, joints)
         self.children = np.array(children)  # (G,)
         self.bones = normalize(solver.offsets[None, self.children])  # (1, G, 3)
+        limbs = {limb.hinge: limb for limb in solver.limbs}
+        self.bent = None  # (1, G, 4), or none where no joint is a hinge
+        if any(j in limbs for j in joints):
+            axes = [_hinge_axis(solver, limbs[j]) if j in limbs else np.array([1.0, 0.0, 0.0]) for j in joints]
+            angles = np.array([[HALF_BENT if j in limbs else 0.0 for j in joints]])
+            self.bent = _turn(np.array(axes)[None], angles)
 
     def turn(self, rows: _Rows) -> None:
         before = self.place(rows)
+        if self.bent is not None:
+            before = multiply(before, self.bent)
         aim = rows.target.take(self.children, 1) - rows.places.take(self.joints, 1)
         rows.world[:, self.joints] = aimed(before, self.bones, aim)
 
@@ -303,8 +315,7 @@ class _Limbs(_Group):
         self.bones = normalize(solver.offsets[None, self.hinges])  # (1, G, 3), as all that follow
         self.neutral = normalize(np.array([[limb.neutral for limb in limbs]]))
         self.to_neutral = between(self.bones, self.neutral)  # (1, G, 4)
-        normal = np.array([[limb.normal for limb in limbs]])
-        self.axes = normalize(normal - self.bones * dot(self.bones, normal)[..., None])  # perpendicular to the bones
+        self.axes = np.array([[_hinge_axis(solver, limb) for limb in limbs]])  # perpendicular to the bones
 
     def turn(self, rows: _Rows) -> None:
         before = self.place(rows)
@@ -317,6 +328,12 @@ class _Limbs(_Group):
         seen = _evidence(dot(axis, across), dot(axis, cross(upper, across)), self.one_way)
         twist = [rows.moments.bend(number, seen[:, k]) for k, number in enumerate(self.numbers)]
         rows.world[:, self.joints] = multiply(swing, _turn(self.bones, np.array(twist).T))
+
+
+def _hinge_axis(solver: FrameSolver, limb: HingeLimb) -> Array:
+    """Return the axis (3,) about which a hinge bends in the T-pose, perpendicular to the bone above it."""
+    bone, normal = normalize(solver.offsets[limb.hinge]), np.array(limb.normal)
+    return normalize(normal - bone * dot(bone, normal))
 
 
 def _evidence(along: Array, beside: Array, one_way: NDArray[np.bool_]) -> Array:

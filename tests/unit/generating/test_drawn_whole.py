@@ -199,3 +199,28 @@ def test_several_kicks_come_one_out_of_the_other() -> None:
     assert one is not None
     assert two is not None
     assert len(one.features) < len(two.features) < 1.75 * len(one.features)
+
+
+@pytest.mark.parametrize("action", ["die", "clap", "jump", "bow"])
+def test_other_words_of_one_action_give_another_take_and_the_same_words_the_same(action: str) -> None:
+    said = [f"a person does {action}", f"someone does {action}", f"Someone does  {action}."]
+    one, other, again = (drawn_whole(LAYOUT, action, FineWish(prompt=each), 1, None) for each in said)
+    assert one is not None
+    assert other is not None
+    assert again is not None
+    np.testing.assert_array_equal(other.features, again.features)
+    frames = min(len(one.features), len(other.features))
+    ways = [LAYOUT.decode(each.features[:frames]) for each in (one, other)]
+    assert np.linalg.norm(ways[0] - ways[1], axis=-1).mean() > 0.01
+
+
+def test_words_that_would_not_show_the_action_give_what_the_seed_alone_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    module, wish = "marey.generation.drawn_whole", FineWish(prompt="a person bows")
+    with monkeypatch.context() as patched:
+        patched.setattr(f"{module}._shows", lambda *_: False)
+        made = drawn_whole(LAYOUT, "bow", wish, 1, None)
+    monkeypatch.setattr(f"{module}.worded_seed", lambda seed, _: seed)
+    alone = drawn_whole(LAYOUT, "bow", wish, 1, None)
+    assert made is not None
+    assert alone is not None
+    np.testing.assert_array_equal(made.features, alone.features)

@@ -112,7 +112,7 @@ def test_a_deep_bow_is_deep_and_takes_its_time(seed: int) -> None:
     trunk = joints[:, 12] - joints[:, 0]
     lean = np.degrees(np.arctan2(np.hypot(trunk[:, 0], trunk[:, 2]), trunk[:, 1]))
     assert lean.max() > 56
-    assert (lean > 30).sum() > 30  # frames
+    assert (lean > 30).sum() > 25  # frames
 
 
 @pytest.mark.parametrize("text", ["crouches, arms over the head", "crouches and covers his head"])

@@ -197,3 +197,15 @@ def test_joints_that_are_none_are_refused(bad):
 def test_joints_all_in_one_place_are_solved_without_nan():
     pose = solve_pose(np.zeros((5, 22, 3)), HUMANML3D)
     assert np.isfinite(pose.rotations).all()
+
+
+def test_a_folded_forearm_that_moves_a_little_turns_a_little():
+    frames, elbow, wrist = 24, HUMANML3D.index("L_elbow"), HUMANML3D.index("L_wrist")
+    joints = np.repeat(HUMANML3D.rest[None].astype(float), frames, axis=0)
+    circle, fold = np.linspace(0, 4 * np.pi, frames), np.radians(12)
+    back = np.stack([np.full(frames, -np.cos(fold)), np.sin(fold) * np.sin(circle), np.sin(fold) * np.cos(circle)], -1)
+    joints[:, wrist] = joints[:, elbow] + 0.25 * back
+    solved = solve_pose(joints, HUMANML3D, measure=False)
+    np.testing.assert_allclose(solved.joints, joints, atol=1e-5)
+    moved = np.degrees(angle_between(solved.rotations[1:, elbow], solved.rotations[:-1, elbow]))
+    assert moved.max() < 12

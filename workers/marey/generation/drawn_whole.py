@@ -25,6 +25,7 @@ from marey.generation.fine import FINE
 from marey.generation.fine_wish import FineWish
 from marey.generation.stated import stated_features
 from marey.generation.striking import stands
+from marey.generation.timed import worded_seed
 from marey.generation.whole_body import CHOICES, QUICKER, is_drawn, retimed
 from marey.motion.features import FeatureLayout, encode_all
 from marey.posing.limbs import FPS
@@ -50,6 +51,8 @@ SHORT_S = (2.0, 2.6)
 """The same of a body that does other things before or after: of some actions, and of all others."""
 ROUNDS_S: Mapping[str, tuple[float, float]] = {"dodge": (2.1, 1.2), "nod": (0.75, 1.0)}
 """Seconds of each of a stated number, and beside them."""
+ONE_TAKE = frozenset({"shoot", "throw", "wave"})
+"""Actions that not every take shows clearly: the seed alone decides theirs."""
 TRIES = 40
 """Movements of random kind, side and length, of which those are left out that the prompt does not ask for."""
 MOST_TRIES = 160
@@ -86,12 +89,26 @@ def drawn_whole(layout: FeatureLayout, action: str, wish: FineWish, seed: int, f
         layout: of the features, on the skeleton of HumanML3D.
         action: id in the vocabulary.
         wish: what the prompt asks for.
-        seed: of the motion.
+        seed: of the motion; it and the words of the prompt decide what is drawn.
         frames: that it keeps if its length is fixed, and has at least otherwise; None = as many as it takes.
     """
     stated = stated_features(layout, action, wish, frames, seed)
     if stated is not None:
         return DrawnWhole(stated, exact=True)
+    if action not in ONE_TAKE and not any(wish.beside):  # rows of a sequence have seeds of their own
+        made = _one(layout, action, wish, worded_seed(seed, wish.prompt), frames)
+        if made is not None and _shows(made, layout, action):
+            return made
+    return _one(layout, action, wish, seed, frames)
+
+
+def _shows(made: DrawnWhole, layout: FeatureLayout, action: str) -> bool:
+    """Return True if a drawn motion shows its action, however it was hurried."""
+    return len(made.features) < SHORTEST or RULES[action](Motion(layout.decode(made.features), FPS), "") >= SHOWN
+
+
+def _one(layout: FeatureLayout, action: str, wish: FineWish, seed: int, frames: int | None) -> DrawnWhole | None:
+    """Return the motion that is drawn of an action by one seed; None if none is."""
     rng = np.random.default_rng([seed, len(action)])
     if action in ALONE and ALONE[action](wish):
         body = standing_still(frames or _frames(action, wish, rng), random.Random(f"{seed} stands"))  # noqa: S311

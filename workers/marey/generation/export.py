@@ -6,9 +6,10 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from marey.generation.asked import changes_of, draws_bearings
+from marey.generation.asked import changes_of, draws, draws_bearings
 from marey.generation.bearing import actions_alone, borne, borne_spans, with_bearing
 from marey.generation.gazing import with_gaze
+from marey.generation.living import with_life
 from marey.generation.loaded import with_load
 from marey.generation.named import names_movement
 from marey.generation.port import Generator, MotionFeatures, Request, S
@@ -97,7 +98,8 @@ def finish(
     drawn = borne(generated, layout, spans)
     if request.is_sequence and request.timeline is not None and draws_bearings(generator, request):
         drawn = with_load(drawn, layout, request.timeline)
-    clip = with_gaze(finished(drawn))
+    clip = finished(drawn)
+    clip = with_gaze(with_life(clip, request) if draws(generator, request) else clip)
     acts = actions_alone(spans)
     as_made = clip if acts == spans else finished(borne(generated, layout, acts))
     return judged(clip, request, as_made=as_made)

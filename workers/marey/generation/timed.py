@@ -57,3 +57,14 @@ def part_seed(seed: int, part: str, number: int) -> int:
     """Return the seed of a part of a motion, from the seed of the whole."""
     digest = hashlib.sha256(f"marey {part} {seed} {number}".encode()).digest()
     return int.from_bytes(digest[:8], "little") % (MAX_SEED + 1)
+
+
+WORDED = 2**16
+"""Seeds that words of a movement lead to from one seed."""
+
+
+def worded_seed(seed: int, said: str) -> int:
+    """Return the seed of what is drawn for words, so that other words give another take of the same action. It grows
+    with the seed, by one."""
+    words = " ".join(said.lower().split()).rstrip(".!")
+    return seed + int.from_bytes(hashlib.sha256(words.encode()).digest()[:8], "little") % WORDED

@@ -43,6 +43,11 @@ LEAST = 24
 """Frames of a way that is held, at least."""
 
 
+def says_frozen(said: str) -> bool:
+    """Return True if words, in any case, have a body stop as it is."""
+    return _FREEZES.search(said.lower()) is not None
+
+
 def freezes(before: str, action: str, said: str) -> bool:
     """Return True if a body that waits stays in the posture of the way before it.
 
@@ -53,7 +58,7 @@ def freezes(before: str, action: str, said: str) -> bool:
     """
     if action not in ("idle", "") or before not in FREEZES_FROM:
         return False
-    return _FREEZES.search(said) is not None or (action == "idle" and before in LOW)
+    return says_frozen(said) or (action == "idle" and before in LOW)
 
 
 def frozen(before: Float32, frames: int, layout: FeatureLayout) -> JoinedRows | None:
