@@ -23,7 +23,9 @@ from marey.data.prepare import CaptureSet, retarget_file
 from marey.generate import load
 from marey.motion import MotionClip, edit
 from marey.motion.arrange import placement_of
+from marey.motion.edits.loop import STILL
 from marey.motion.edits.loop_feet import standing_spans, supports
+from marey.motion.edits.loop_search import has_steps
 from marey.motion.feet import find_contacts, runs, skate
 from marey.motion.pose import solve_pose
 from marey.motion.rotations import rotate
@@ -81,6 +83,23 @@ def _seams(clip: MotionClip, loop: MotionClip, played: MotionClip) -> Iterator[s
             yield f"step {around.max():.2f} of the bar"
         if (most := float((bend[seam - 1] / (np.percentile(change, 95, axis=0) + 1.1e-4)).max())) > 1:
             yield f"change of step {most:.2f} of the bar"
+    for view in (played.joints, played.joints - played.joints[:, :1] * np.array([1.0, 0.0, 1.0])):
+        if (most := _peak(view.astype(np.float64), loop.frames - 1)) > 1:
+            yield f"a joint moves {most:.2f} of the bar, by the rest of the cycle"
+    blend = loop.manifest["loop"]["blend_frames"]
+    own = slice(loop.frames - 1 - blend["last"], loop.frames - 1 + blend["first"])
+    for name, found, source in (("step", mine, step), ("change of step", bend, change)):
+        if (most := float((found[own] / (source.max(axis=0) + 1.1e-4)).max(initial=0.0))) > 1.1:
+            yield f"{name} {most:.2f} of the largest of the source, in the blend"
+
+
+def _peak(joints: np.ndarray, cycle: int) -> float:
+    """Return the largest step of a joint, or change of step, at the first seam, over the bar by the rest of a cycle."""
+    most = 0.0
+    for number in (1, 2):
+        values = np.linalg.norm(np.diff(joints, number, axis=0), axis=-1)[:cycle]
+        most = max(most, float((values[-number:].max(axis=0) / (1.1 * values[:-number].max(axis=0) + 6e-4)).max()))
+    return most
 
 
 def _feet(clip: MotionClip, loop: MotionClip, played: MotionClip) -> Iterator[str]:
@@ -106,7 +125,8 @@ def _kept(clip: MotionClip, loop: MotionClip) -> Iterator[str]:
     turn, shift = placement_of(loop)
     placed = rotate(turn, loop.joints.astype(np.float64)) + shift
     blend = about["blend_frames"]
-    if sum(blend.values()) > 0.3 * clip.fps + 1e-6:
+    longest = 0.3 if has_steps(clip, clip.contacts) else max(STILL)
+    if sum(blend.values()) > longest * clip.fps + 1e-6:
         yield f"a blend of {sum(blend.values())} frames"
     own = slice(blend["first"], last - first + 1 - blend["last"])
     if (off := float(np.abs(placed[own] - clip.joints[first : last + 1][own]).max(initial=0.0))) > 1e-4:

@@ -143,6 +143,38 @@ def test_an_idle_loop_has_two_seconds_or_more():
         edit(idle(1.9), [LOOP])
 
 
+def leaning(seconds: float) -> MotionClip:
+    """A standing body that leans over to one side and does not come back."""
+    clip = idle(seconds)
+    rotations, way = clip.rotations.astype(np.float64), np.tanh(np.linspace(-2.0, 2.0, clip.frames))
+    rotations[:, HUMANML3D.index("spine1")] = from_rotvec(np.outer(way, [0.015, 0.0, 0.05]))
+    return MotionClip.of(HUMANML3D, rotations, clip.root, clip.contacts, clip.fps)
+
+
+def test_a_body_that_shifts_its_weight_fades_over_a_longer_span():
+    clip = leaning(6.0)
+    (loop,) = edit(clip, [LOOP])
+    blend = sum(loop.manifest["loop"]["blend_frames"].values())
+    assert 6 < blend <= 40
+    played = thrice(loop)
+    for number in (1, 2):
+        source, found = (np.linalg.norm(np.diff(c.joints, number, axis=0), axis=-1) for c in (clip, played))
+        assert (found.max(axis=0) <= 1.1 * source.max(axis=0) + 2e-4).all()
+
+
+@pytest.mark.parametrize("speed", [0.8, 1.1, 1.4])
+def test_no_joint_moves_more_at_the_seam_than_elsewhere_in_the_cycle(speed):
+    """A foot that lands, or a hand that turns back, just at the seam would be a hitch in each cycle."""
+    short = swaying(bodies.Body(3.6, speed=lambda t: speed + 0 * t, duty=0.6, cadence=2.0))
+    (loop,) = edit(short, [LOOP])
+    (in_place,) = edit(loop, [{"op": "in-place"}])
+    for clip in (loop, in_place):
+        joints, cycle = thrice(clip).joints.astype(np.float64), clip.frames - 1
+        for number in (1, 2):
+            moves = np.linalg.norm(np.diff(joints, number, axis=0), axis=-1)[:cycle]
+            assert (moves[-number:].max(axis=0) - moves[:-number].max(axis=0)).max() < 7e-4
+
+
 def test_a_motion_without_a_cycle_is_refused_with_the_bar_that_it_misses():
     frames = 60
     rotations = np.zeros((frames, 22, 4))

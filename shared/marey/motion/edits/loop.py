@@ -1,13 +1,13 @@
 """`loop`: a cycle of a motion that can be played on and on.
 
 Candidates are pairs of frames with nearly the same pose and movement (`loop_search.py`). Each is closed by a blend
-before its end (`loop_blend.py`); the first one that keeps all bars (`loop_bars.py`) is the loop.
+before its end (`loop_blend.py`); the first one that keeps all bars (`loop_bars.py`) is the loop, or
+the best of those in which a joint moves most at the seam where all are so.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from itertools import product
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from marey.core.errors import InvalidInput
@@ -27,6 +27,9 @@ TRIED = 100
 SLOWER = (0.0, 0.04)
 """Shares of a blend's length that it shows less of the source, tried in this order; 0.04 is slower by 8 percent in the
 middle of the blend. In a run hardly a frame lies within the bars by itself."""
+STILL = (0.6, 1.0, 1.5, 2.0)
+"""Seconds of further blends of a motion without steps: a body that stands shifts its weight by centimetres and hardly
+comes back, and its joints move by a millimetre a frame, so that a short blend shows."""
 
 
 def loop(clip: MotionClip, values: Mapping[str, Any]) -> MotionClip:
@@ -46,17 +49,31 @@ def loop(clip: MotionClip, values: Mapping[str, Any]) -> MotionClip:
     """
     need_feet(clip.skeleton)
     contacts = clip.contacts if clip.contacts.any() else found_contacts(clip)
-    window = max(int(values["blend"] * clip.fps + 1e-6), 1)
-    bars, best = Bars(clip, window), None
-    candidates = list(cycles(clip, contacts, window, TRIED))
-    for slower, cycle in product(SLOWER, candidates):
-        if slower and cycle.first < window:
-            continue
-        found = bars.best(closed(clip, contacts, cycle, window, slower * window))
-        if isinstance(found, Closed):
-            return _result(clip, found, cycle, values)
-        best = found if best is None or found.excess < best.excess else best
+    bars = Bars(clip)
+    best: Fault | None = None
+    spare: tuple[Closed, Cycle] | None = None
+    for window, slower in _blends(clip, contacts, values["blend"]):
+        for cycle in cycles(clip, contacts, window, TRIED):
+            if slower and cycle.first < window:
+                continue
+            found = bars.best(closed(clip, contacts, cycle, window, slower * window))
+            if isinstance(found, Closed):
+                if found.hitch <= 1.0:
+                    return _result(clip, found, cycle, values)
+                spare = spare if spare and spare[0].hitch <= found.hitch else (found, cycle)
+                continue
+            best = found if best is None or found.excess < best.excess else best
+    if spare:
+        return _result(clip, *spare, values)
     raise _refused(clip, contacts, best)
+
+
+def _blends(clip: MotionClip, contacts: Any, seconds: float) -> Iterator[tuple[int, float]]:
+    """Yield the blends to try in this order: their frames, and the share that they show less of the source."""
+    lengths = [seconds] if has_steps(clip, contacts) else [seconds, *(each for each in STILL if each > seconds)]
+    for length in lengths:
+        for slower in SLOWER if length == seconds else SLOWER[:1]:
+            yield max(int(length * clip.fps + 1e-6), 1), slower
 
 
 def _refused(clip: MotionClip, contacts: Any, best: Fault | None) -> InvalidInput:

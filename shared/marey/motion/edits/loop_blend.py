@@ -82,6 +82,7 @@ class Closed:
         blend: number of frames before the last that differ from the source.
         room: largest number of frames by which the cycle can begin earlier: there are no more in the source.
         earlier: number of frames by which the seam is before the end of the blend.
+        hitch: largest measure of the seam over what does not show; above 1 a joint moves most just there.
     """
 
     rotations: Array = field(repr=False)
@@ -91,6 +92,7 @@ class Closed:
     blend: int
     room: int
     earlier: int = 0
+    hitch: float = 0.0
 
     def begun(self, earlier: int) -> Closed:
         """Return the cycle with its seam some frames earlier: they come before the first one, moved back."""

@@ -177,7 +177,8 @@ _ALL = (
             ),
             Parameter(
                 "blend",
-                f"seconds before the end in which the loop may differ from its source; default {LONGEST_BLEND:g}.",
+                f"seconds before the end in which the loop may differ from its source, up to 2 in a motion without "
+                f"steps where that is too short; default {LONGEST_BLEND:g}.",
                 number(0.1, LONGEST_BLEND),
                 LONGEST_BLEND,
                 option="--blend",
