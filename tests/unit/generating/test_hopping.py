@@ -74,3 +74,19 @@ def test_hops_ahead_stay_on_their_foot(prompt: str, side: str, count: int, seed:
     assert joints[-1, 0, 2] - joints[0, 0, 2] == pytest.approx(0.41 * count, abs=0.1 * count)
     assert RULES["hop"](Motion(joints, FPS), side) >= 0.5
     assert len(REPETITIONS["hop"](Motion(joints, FPS))) == count
+
+
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize(
+    ("action", "prompt"),
+    [
+        ("hop", "hops ahead on his right leg"),
+        ("hop", "hops sideways"),
+        ("hop", "hops backward on one leg"),
+        ("jump", "jumps far to the left"),
+    ],
+)
+def test_hips_set_off_before_a_flight_and_arrive_after_it(action: str, prompt: str, seed: int) -> None:
+    joints = moved(action, prompt, seed)[0].astype(np.float64)
+    velocity = np.diff(joints[:, 0, [0, 2]], axis=0) * FPS
+    assert np.linalg.norm(np.diff(velocity, axis=0), axis=1).max() < 0.7  # metres a second, gained in a frame

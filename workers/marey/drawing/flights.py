@@ -15,7 +15,7 @@ from marey.drawing.sequels import Sequel
 from marey.motion.rotations import normalize
 from marey.motion.skeleton import HUMANML3D
 from marey.posing.limbs import GRAVITY
-from marey.posing.standing import LEFT, RIGHT, StandingBody
+from marey.posing.standing import LEFT, RIGHT, SIGN, StandingBody
 
 _LEGS = {LEFT: (7, 10), RIGHT: (8, 11)}
 _LENGTH = {side: float(np.linalg.norm(HUMANML3D.offsets[toe])) for side, (_, toe) in _LEGS.items()}
@@ -34,16 +34,16 @@ class StandingFoot:
     towards: tuple[float, float]
     """Outward and forward, of length 1."""
 
-    def flat(self, forward: float = 0.0, up: float = 0.0) -> FootPlace:
+    def flat(self, forward: float = 0.0, up: float = 0.0, left: float = 0.0) -> FootPlace:
         """The foot flat, moved by metres."""
-        return FootPlace((self.out, _ANKLE + up, self.forward + forward))
+        return FootPlace((self.out + SIGN[self.side] * left, _ANKLE + up, self.forward + forward))
 
-    def tiptoe(self, degrees: float, forward: float = 0.0, up: float = 0.0) -> FootPlace:
+    def tiptoe(self, degrees: float, forward: float = 0.0, up: float = 0.0, left: float = 0.0) -> FootPlace:
         """The foot with its heel lifted about the toes until it points down by degrees below level, moved by metres."""
         length, pitch = _LENGTH[self.side], math.radians(degrees)
         level = math.sqrt(length**2 - (_ANKLE - _TOE) ** 2) - length * math.cos(pitch)
         at = (
-            self.out + level * self.towards[0],
+            self.out + SIGN[self.side] * left + level * self.towards[0],
             _TOE + length * math.sin(pitch) + up,
             self.forward + level * self.towards[1] + forward,
         )

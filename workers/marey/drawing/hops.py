@@ -13,9 +13,9 @@ from marey.drawing.flights import StandingFoot, fly, on_feet
 from marey.drawing.gesture import SIDES, Gesture
 from marey.drawing.postures import STAND, FootPlace, HandPlace, Posture
 from marey.drawing.sequels import Sequel, both, near
-from marey.motion.rotations import from_rotvec, normalize, rotate
+from marey.motion.rotations import from_rotvec, rotate
 from marey.posing.limbs import LEVEL
-from marey.posing.standing import LEFT, RIGHT, StandingBody, eased
+from marey.posing.standing import LEFT, RIGHT, SIGN, StandingBody, eased
 
 Array = NDArray[np.floating]
 
@@ -46,7 +46,18 @@ _ARMS = {
 
 def hop(rng: random.Random, *, times: int | None = None) -> Gesture:
     """Drawn for the right foot and mirrored for the left one; the left foot is lifted."""
+    return _hops(_Hops(rng, times))
+
+
+def hop_away(rng: random.Random, times: int, left: float, ahead: float, side: str = "") -> Gesture:
+    """Hops on one foot, that of `side` unless it is empty, in a direction: metres of each."""
     drawn = _Hops(rng, times)
+    drawn.side = side or drawn.side
+    drawn.aside, drawn.stride = -SIGN[drawn.side] * left, ahead
+    return _hops(drawn)
+
+
+def _hops(drawn: _Hops) -> Gesture:
     times, form, stride = drawn.times, drawn.form, drawn.stride
     kinds = ["hop", "hop-ahead" if stride else "hop-place", "hop-once" if times == 1 else "hop-many", form]
     if form == "hop-bent":
@@ -63,7 +74,8 @@ class _Hops:
     Attributes:
         side: of the foot that is hopped on once the gesture is mirrored.
         form: key of `_FREE`, for the lifted foot, which is at `free`, its knee toward `knee`.
-        times, stride: number of hops, and metres of each.
+        times: number of hops.
+        stride, aside: metres ahead and to the left of each, before it is mirrored.
         flight, more, ground: seconds of a flight, a factor of it for each hop, and seconds on the floor between.
         arms, swing: key of `_ARMS`, and metres by which the hands go up and down.
         dip, deep, lean: metres by which the hips go down at a hop and at a landing more, and degrees of the trunk.
@@ -74,13 +86,13 @@ class _Hops:
         self.side = rng.choice(SIDES)
         self.flight, self.ground = rng.uniform(0.22, 0.36), rng.uniform(0.24, 0.4)
         self.times = times or rng.randint(1, min(9, int(_LONGEST / (self.flight + self.ground)) - 2))
-        self.stride = rng.choice((0.0, rng.uniform(0.2, 0.55)))
+        self.stride, self.aside = rng.choice((0.0, rng.uniform(0.2, 0.55))), 0.0
         self.form = rng.choices(list(_FREE), (4, 3, 2))[0]
         free, self.knee = _FREE[self.form]
         self.free = replace(free, at=near(rng, free.at, 0.03))
         self.arms, self.swing = rng.choice(list(_ARMS)), rng.uniform(0.02, 0.1)
         self.dip, self.deep = rng.uniform(0.05, 0.09), rng.uniform(0.0, 0.03)
-        self.lean = rng.uniform(2, 9) + 8 * self.stride
+        self.lean = rng.uniform(2, 9)
         self.starts, self.lift = rng.uniform(0.15, 0.7), rng.uniform(0.3, 0.5)
         self.more = [rng.uniform(0.93, 1.07) for _ in range(self.times)]
         self.after = rng.uniform(0.3, 0.7)
@@ -93,42 +105,45 @@ class _Hops:
         done.then(self.lift, self._at(on, 0.92, 0.0, on.flat(), 0.0), 0.1)
         done.then(0.6 * self.ground, self._at(on, low, 0.0, on.flat(), -1.0))
         for k in range(self.times):
-            there, last = (k + 1) * self.stride, k == self.times - 1
+            flat, last = on.flat(*self._moved(k + 1)), k == self.times - 1
             self._hop(done, on, k)
-            done.then(0.08, self._at(on, 0.91, there - 0.08 * self.stride, on.flat(there), 0.0))
-            landed = self._at(on, low - self.deep, there, on.flat(there), -1.0)
+            done.then(0.08, self._at(on, 0.91, k + 0.92, flat, 0.0))
+            landed = self._at(on, low - self.deep, k + 1, flat, -1.0)
             done.then(0.47 * self.ground, landed, 0.15 if last else 0.0)
-        end = self.times * self.stride
-        done.then(0.35, self._at(on, 0.92, end, on.flat(end), 0.0), 0.1)
-        down = {one: foot.flat(end) for one, foot in feet.items()}
-        done.then(0.45, Posture((0.0, 0.93, end), feet=down) if self.stride else STAND)
+        forward, _, left = self._moved(self.times)
+        done.then(0.35, self._at(on, 0.92, self.times, on.flat(forward, left=left), 0.0), 0.1)
+        down = {one: foot.flat(forward, left=left) for one, foot in feet.items()}
+        done.then(0.45, Posture((left, 0.93, forward), feet=down) if forward or left else STAND)
         return done
 
     def _hop(self, done: Sequel, on: StandingFoot, k: int) -> None:
         """Add the way up to the toes and the flight of hop `k`."""
-        stride = self.stride
-        here, there = k * stride, (k + 1) * stride
-        leaving = self._at(on, 0.955, here + 0.22 * stride, on.tiptoe(_LEAVES, here), 1.0)
-        landing = self._at(on, 0.94, there - 0.2 * stride, on.tiptoe(38, there), 0.4)
+        leaving = self._at(on, 0.955, k + 0.22, on.tiptoe(_LEAVES, *self._moved(k)), 1.0)
+        landing = self._at(on, 0.94, k + 0.8, on.tiptoe(38, *self._moved(k + 1)), 0.4)
 
         def shaped(share: float, rise: float) -> Posture:
-            """The foot hangs with its toes down and goes ahead."""
-            moved = here + share * stride
-            foot = on.tiptoe(58 - 18 * share, moved, rise + 0.03 * (1 - abs(2 * share - 1)))
-            return self._at(on, 0.95 + rise, moved, foot, 1.0)
+            """The foot hangs with its toes down and goes where the hop does."""
+            up = rise + 0.03 * (1 - abs(2 * share - 1))
+            foot = on.tiptoe(58 - 18 * share, *self._moved(k + share, up))
+            return self._at(on, 0.95 + rise, k + share, foot, 1.0)
 
         done.then(0.45 * self.ground, leaving)
         fly(done, self.flight * self.more[k], leaving, landing, shaped)
 
-    def _at(self, on: StandingFoot, up: float, where: float, foot: FootPlace, high: float) -> Posture:
-        """The posture with the hips `up` over the floor and `where` ahead; `high`: share of the hands' swing."""
-        hand, free = _ARMS[self.arms], self.free
+    def _moved(self, hops: float, up: float = 0.0) -> tuple[float, float, float]:
+        """Metres ahead, up and to the left of a foot after so many hops."""
+        return hops * self.stride, up, hops * self.aside
+
+    def _at(self, on: StandingFoot, up: float, hops: float, foot: FootPlace, high: float) -> Posture:
+        """The posture with the hips `up` over the floor, after so many hops; `high`: share of the hands' swing."""
+        hand, free, lean = _ARMS[self.arms], self.free, self.lean + 8 * self.stride
+        ahead, _, left = self._moved(hops)
         lifted = replace(hand, at=(hand.at[0], hand.at[1] + self.swing * high, hand.at[2]))
-        raised = replace(free, at=(free.at[0], free.at[1] + up - 0.9, free.at[2] + where))
+        raised = replace(free, at=(free.at[0] + left, free.at[1] + up - 0.9, free.at[2] + ahead))
         return Posture(
-            (-on.out + 0.02, up, on.forward + where - 0.02),
-            (self.lean, 2, 0),
-            (self.lean, 0, 0),
+            (left - on.out + 0.02, up, on.forward + ahead - 0.02),
+            (lean, 2, 0),
+            (lean, 0, 0),
             hands=both(lifted),
             feet={LEFT: raised, RIGHT: foot},
             knees={LEFT: self.knee},
@@ -176,6 +191,7 @@ def _jump(rng: random.Random, ahead: float, times: int | None) -> Gesture:
     return replace(jumps(rng, kinds, rng.uniform(0.15, 0.8), flight, times, ahead=ahead, tuck=tuck), untrue=untrue)
 
 
+<<<<<<< HEAD
 def jump_aside(rng: random.Random, flight: float, times: int, metres: float, *, low: bool = False) -> Gesture:
     """Quick jumps of both feet to the left, by so many metres each; less than 0 = to the right. `low`: as in
     `jumps`."""
@@ -212,6 +228,12 @@ def _move_in_flights(joints: Array, left: float, ahead: float) -> None:
     for first, last in zip(begins, ends, strict=False):
         share = np.clip((np.arange(len(joints)) - first) / (last - first), 0.0, 1.0)
         joints += share[:, None, None] * way
+=======
+def jump_aside(rng: random.Random, flight: float, times: int, metres: float) -> Gesture:
+    """Quick jumps of both feet to the left, by so many metres each; less than 0 = to the right."""
+    gesture = jumps(rng, ["jump-aside"], rng.uniform(0.55, 0.8), flight, times, aside=metres, quick=True)
+    return replace(gesture, side=LEFT if metres > 0 else RIGHT)
+>>>>>>> runs
 
 
 def jump_turned(rng: random.Random, degrees: float) -> Gesture:
@@ -245,6 +267,7 @@ def jumps(
     times: int,
     *,
     ahead: float = 0.0,
+    aside: float = 0.0,
     tuck: float = 0.0,
     quick: bool = False,
     low: bool = False,
@@ -258,11 +281,17 @@ def jumps(
         flight: seconds of each flight.
         times: number of jumps.
         ahead: metres of each; less than 0 = back.
+        aside: metres of each to the left; less than 0 = to the right.
         tuck: metres by which the feet are drawn up.
         quick: at once, without a swing of the arms.
         low: the last one ends in a crouch.
     """
+<<<<<<< HEAD
     drawn = _Jumps(rng, starts, flight, times, ahead=ahead, tuck=tuck, low=low)
+=======
+    drawn = _Jumps(rng, starts, flight, times, ahead=ahead, tuck=tuck)
+    drawn.aside = aside
+>>>>>>> runs
     if quick:
         drawn.hurry()
     return on_feet(drawn.sequel, kinds, drawn.after, times=times)
@@ -285,6 +314,7 @@ class _Jumps:
     ) -> None:
         self.low = low
         self.starts, self.flight, self.times, self.ahead, self.tuck = starts, flight, times, ahead, tuck
+        self.aside = 0.0
         self.dip = 0.1 + 0.75 * (flight - 0.3) + rng.uniform(0.0, 0.06)
         self.land = 0.12 + 0.5 * (flight - 0.3) + rng.uniform(0.0, 0.05)
         self.arms = rng.choice(["up", "ahead", "bent", "side"] if flight < 0.45 else ["up", "up", "ahead"])
@@ -301,8 +331,9 @@ class _Jumps:
     def sequel(self, feet: dict[str, StandingFoot]) -> Sequel:
         """The postures over the feet of an idle."""
         done = Sequel([self.starts])
-        done.then(self.crouch, self._crouched(0.0, _flat(feet, 0.0), 0.8), 0.04)
+        done.then(self.crouch, self._crouched(feet, 0, 0.8), 0.04)
         for k in range(self.times):
+<<<<<<< HEAD
             here, there = k * self.ahead, (k + 1) * self.ahead
             self._jump(done, feet, here, there)
             flat, land = _flat(feet, there), self.land
@@ -312,53 +343,71 @@ class _Jumps:
                 crouch = self._at(_CROUCHED_M, there - 0.06, flat, _SWUNG["bent"], 34, 22)
                 done.then(1.4 * self.absorb, crouch, 0.7)
                 return done
+=======
+            self._jump(done, feet, k)
+            flat, land = self._flat(feet, k + 1), self.land
+            done.then(0.07, self._at(0.915 - 0.35 * land, k + 0.9, flat, _SWUNG["bent"], 40 * land, 20 * land))
+>>>>>>> runs
             if k < self.times - 1:
-                done.then(self.absorb, self._crouched(there, flat, 0.6))
+                done.then(self.absorb, self._crouched(feet, k + 1, 0.6))
             else:
-                soft = self._at(0.92 - land, there - 0.3 * land, flat, _SWUNG["bent"], 70 * land, 50 * land)
+                soft = self._at(0.92 - land, k + 1, flat, _SWUNG["bent"], 70 * land, 50 * land, back=0.3 * land)
                 done.then(self.absorb, soft, 0.05)
-        end = self.times * self.ahead
-        done.then(self.straighten, Posture((0.0, 0.935, end), feet=_flat(feet, end)) if self.ahead else STAND)
+        ahead, _, left = self._moved(self.times)
+        end = Posture((left, 0.935, ahead), feet=self._flat(feet, self.times)) if ahead or left else STAND
+        done.then(self.straighten, end)
         return done
 
-    def _jump(self, done: Sequel, feet: dict[str, StandingFoot], here: float, there: float) -> None:
-        """Add the way up to the toes and the flight from one place to another, metres ahead of the idle's."""
+    def _jump(self, done: Sequel, feet: dict[str, StandingFoot], k: int) -> None:
+        """Add the way up to the toes and the flight of jump `k`."""
         ahead, arms = self.ahead, _SWUNG[self.arms]
         lean = 4 + 16 * ahead
-        leaving = self._at(0.975 - 0.05 * ahead, here + 0.26 * ahead, _tiptoe(feet, _LEAVES, here), arms, lean)
-        landing = self._at(
-            0.93 - 0.05 * ahead, there - 0.16 * ahead, _tiptoe(feet, 36, there), _SWUNG["bent"], 0.6 * lean
-        )
+        leaving = self._at(0.975 - 0.05 * ahead, k + 0.26, self._tiptoe(feet, _LEAVES, k), arms, lean)
+        landing = self._at(0.93 - 0.05 * ahead, k + 0.84, self._tiptoe(feet, 36, k + 1), _SWUNG["bent"], 0.6 * lean)
 
         def shaped(share: float, up: float) -> Posture:
             drawn = self.tuck * (1 - (2 * share - 1) ** 2)
-            where = here + ahead * (share + 0.25 * share * (1 - share))
+            there = k + share + 0.25 * share * (1 - share)
             pointed = 66 - 26 * share - 20 * min(ahead, 1.0) * share
             hands = arms if share < 0.6 else _SWUNG["side" if self.arms != "bent" else "bent"]
-            toes = _tiptoe(feet, pointed, where, up + drawn)
-            return self._at(0.95 + up, where, toes, hands, lean * (1 - share), 4 + 40 * drawn)
+            toes = self._tiptoe(feet, pointed, there, up + drawn)
+            return self._at(0.95 + up, there, toes, hands, lean * (1 - share), 4 + 40 * drawn)
 
         if self.back == "back":
-            done.then(_SWING_S, replace(self._crouched(here, _flat(feet, here), 0.6), hands=both(_SWUNG["low"])))
+            done.then(_SWING_S, replace(self._crouched(feet, k, 0.6), hands=both(_SWUNG["low"])))
         done.then(self.rise, leaving)
         fly(done, self.flight, leaving, landing, shaped)
 
-    def _crouched(self, where: float, feet: dict[str, FootPlace], bent: float) -> Posture:
+    def _crouched(self, feet: dict[str, StandingFoot], jumps: int, bent: float) -> Posture:
         """The posture before a jump; `bent`: share of the hips' lean that the spine leans too."""
         lean = 60 * self.dip
-        return self._at(0.92 - self.dip, where - 0.3 * self.dip, feet, _SWUNG[self.back], lean, bent * lean)
+        hand, back = _SWUNG[self.back], 0.3 * self.dip
+        return self._at(0.92 - self.dip, jumps, self._flat(feet, jumps), hand, lean, bent * lean, back=back)
 
     def _at(
-        self, up: float, where: float, feet: dict[str, FootPlace], hands: HandPlace, lean: float, spine: float = 0.0
+        self,
+        up: float,
+        jumps: float,
+        feet: dict[str, FootPlace],
+        hands: HandPlace,
+        lean: float,
+        spine: float = 0.0,
+        *,
+        back: float = 0.0,
     ) -> Posture:
-        return Posture(
-            (0.0, up, where), (lean, 0, 0), (spine, 0, 0), (self.gaze - 0.5 * lean, 0, 0), hands=both(hands), feet=feet
-        )
+        """The posture with the hips `up` over the floor, after so many jumps and metres `back`."""
+        ahead, _, left = self._moved(jumps)
+        neck = (self.gaze - 0.5 * lean, 0, 0)
+        return Posture((left, up, ahead - back), (lean, 0, 0), (spine, 0, 0), neck, hands=both(hands), feet=feet)
 
+    def _moved(self, jumps: float, up: float = 0.0) -> tuple[float, float, float]:
+        """Metres ahead, up and to the left of a foot after so many jumps."""
+        return jumps * self.ahead, up, jumps * self.aside
 
-def _flat(feet: dict[str, StandingFoot], where: float) -> dict[str, FootPlace]:
-    return {side: foot.flat(where) for side, foot in feet.items()}
+    def _flat(self, feet: dict[str, StandingFoot], jumps: float) -> dict[str, FootPlace]:
+        return {side: foot.flat(*self._moved(jumps)) for side, foot in feet.items()}
 
-
-def _tiptoe(feet: dict[str, StandingFoot], degrees: float, where: float, up: float = 0.0) -> dict[str, FootPlace]:
-    return {side: foot.tiptoe(degrees, where, up) for side, foot in feet.items()}
+    def _tiptoe(
+        self, feet: dict[str, StandingFoot], degrees: float, jumps: float, up: float = 0.0
+    ) -> dict[str, FootPlace]:
+        return {side: foot.tiptoe(degrees, *self._moved(jumps, up)) for side, foot in feet.items()}

@@ -39,6 +39,7 @@ from marey.generation.shots.headings import JoinedTurn, heading_change, with_who
 from marey.generation.shots.levels import raised_rows
 from marey.generation.shots.lifted_steps import with_steps
 from marey.generation.shots.raised_arms import FIGHTING, RAISING, STEPPING_ASIDE, TURNING, guarded, kept_arms
+from marey.generation.shots.setting_off import set_off, with_even_speed
 from marey.generation.shots.strands import Fate, RowStrand, Strand, Transition
 from marey.generation.shots.timeline_plan import even_parts, plan_timeline
 from marey.generation.shots.way_lengths import as_long_as, metres_between, ways_back
@@ -108,6 +109,8 @@ def generate_timelines(
     for timeline in timelines:
         if timeline.open and not timeline.fate.dropped:
             timeline.settle(generator.layout)
+        elif timeline.is_sequence and not timeline.fate.dropped and generator.layout.skeleton.name == HUMANML3D.name:
+            set_off(timeline.rows, generator.layout, fixed=True)
         if timeline.is_sequence and not timeline.fate.dropped:
             timeline.lift(generator.layout)
     windows.make([strand for timeline in timelines for strand in timeline.open_transitions(generator.layout)])
@@ -181,6 +184,7 @@ class _Timeline:
             self._lead_back(layout)
             self._keep_guard(layout)
             self._flow(layout)
+            set_off(self.rows, layout, fixed=False)
         later, times = 0.0, list[TimedText]()
         heights = [_pelvis_heights(row.features, layout) for row in self.rows]
         for number, (timed, row) in enumerate(zip(self.timeline, self.rows, strict=True)):
@@ -361,6 +365,8 @@ class _Timeline:
                 pass_into(frames, row.part.start, MEETS)
         for transition in self.transitions:
             frames = transition.write(frames)
+        if self.is_sequence and layout.skeleton.name == HUMANML3D.name:
+            frames = with_even_speed(frames, layout, self.rows, self.plan.transitions)
         if self.open and (turns := self._turns()):
             frames = with_whole_turns(frames, layout, turns)
         if self.open and layout.skeleton.name == HUMANML3D.name:
