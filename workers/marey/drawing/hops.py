@@ -191,49 +191,12 @@ def _jump(rng: random.Random, ahead: float, times: int | None) -> Gesture:
     return replace(jumps(rng, kinds, rng.uniform(0.15, 0.8), flight, times, ahead=ahead, tuck=tuck), untrue=untrue)
 
 
-<<<<<<< HEAD
 def jump_aside(rng: random.Random, flight: float, times: int, metres: float, *, low: bool = False) -> Gesture:
     """Quick jumps of both feet to the left, by so many metres each; less than 0 = to the right. `low`: as in
     `jumps`."""
-    gesture = jumps(rng, ["jump-aside"], rng.uniform(0.55, 0.8), flight, times, quick=True, low=low)
-    return replace(_moving(gesture, metres, 0.0), side=LEFT if metres > 0 else RIGHT)
-
-
-def hop_away(rng: random.Random, times: int, left: float, ahead: float, side: str = "") -> Gesture:
-    """Hops on one foot, that of `side` unless it is empty, in a direction: metres of each."""
-    gesture = hop(rng, times=times)
-    while "hop-place" not in gesture.kinds or side not in ("", gesture.side):
-        gesture = hop(rng, times=times)
-    return _moving(gesture, left, ahead)
-
-
-def _moving(gesture: Gesture, left: float, ahead: float) -> Gesture:
-    """Return jumps on the spot with each by so many metres to the left and ahead."""
-
-    def change(body: StandingBody) -> None:
-        gesture.change(body)
-        _move_in_flights(body.joints, left, ahead)
-
-    return replace(gesture, change=change)
-
-
-def _move_in_flights(joints: Array, left: float, ahead: float) -> None:
-    """Move a body (T, 22, 3) by so many metres each time that both feet are off the floor."""
-    feet = joints[:, _FEET, 1]
-    flies = (feet - feet[0]).min(axis=1) > _OFF
-    begins = np.flatnonzero(flies[1:] & ~flies[:-1])
-    ends = np.flatnonzero(flies[:-1] & ~flies[1:]) + 1
-    outward = normalize((joints[0, 1] - joints[0, 2]) * LEVEL)
-    way = left * outward + ahead * np.cross(outward, [0.0, 1.0, 0.0])
-    for first, last in zip(begins, ends, strict=False):
-        share = np.clip((np.arange(len(joints)) - first) / (last - first), 0.0, 1.0)
-        joints += share[:, None, None] * way
-=======
-def jump_aside(rng: random.Random, flight: float, times: int, metres: float) -> Gesture:
-    """Quick jumps of both feet to the left, by so many metres each; less than 0 = to the right."""
-    gesture = jumps(rng, ["jump-aside"], rng.uniform(0.55, 0.8), flight, times, aside=metres, quick=True)
+    starts = rng.uniform(0.55, 0.8)
+    gesture = jumps(rng, ["jump-aside"], starts, flight, times, aside=metres, quick=True, low=low)
     return replace(gesture, side=LEFT if metres > 0 else RIGHT)
->>>>>>> runs
 
 
 def jump_turned(rng: random.Random, degrees: float) -> Gesture:
@@ -286,12 +249,8 @@ def jumps(
         quick: at once, without a swing of the arms.
         low: the last one ends in a crouch.
     """
-<<<<<<< HEAD
     drawn = _Jumps(rng, starts, flight, times, ahead=ahead, tuck=tuck, low=low)
-=======
-    drawn = _Jumps(rng, starts, flight, times, ahead=ahead, tuck=tuck)
     drawn.aside = aside
->>>>>>> runs
     if quick:
         drawn.hurry()
     return on_feet(drawn.sequel, kinds, drawn.after, times=times)
@@ -333,21 +292,13 @@ class _Jumps:
         done = Sequel([self.starts])
         done.then(self.crouch, self._crouched(feet, 0, 0.8), 0.04)
         for k in range(self.times):
-<<<<<<< HEAD
-            here, there = k * self.ahead, (k + 1) * self.ahead
-            self._jump(done, feet, here, there)
-            flat, land = _flat(feet, there), self.land
-            touch = self._at(0.915 - 0.35 * land, there - 0.1 * self.ahead, flat, _SWUNG["bent"], 40 * land, 20 * land)
-            done.then(0.07, touch)
-            if k == self.times - 1 and self.low:
-                crouch = self._at(_CROUCHED_M, there - 0.06, flat, _SWUNG["bent"], 34, 22)
-                done.then(1.4 * self.absorb, crouch, 0.7)
-                return done
-=======
             self._jump(done, feet, k)
             flat, land = self._flat(feet, k + 1), self.land
             done.then(0.07, self._at(0.915 - 0.35 * land, k + 0.9, flat, _SWUNG["bent"], 40 * land, 20 * land))
->>>>>>> runs
+            if k == self.times - 1 and self.low:
+                crouch = self._at(_CROUCHED_M, k + 1, flat, _SWUNG["bent"], 34, 22, back=0.06)
+                done.then(1.4 * self.absorb, crouch, 0.7)
+                return done
             if k < self.times - 1:
                 done.then(self.absorb, self._crouched(feet, k + 1, 0.6))
             else:
