@@ -43,7 +43,7 @@ def test_an_installed_model_gives_ranges_and_its_bundle_the_defaults(config: Set
     [
         ({"guidance": 101.0}, "guidance: 101 is outside 0 to 100"),
         ({"steps": 2.5}, "steps: is 2.5, not a whole number"),
-        ({"heat": 1.0}, "unknown setting 'heat' of hgm3-starter; known: steps, guidance"),
+        ({"heat": 1.0}, "unknown setting 'heat' of hgm3-starter; known: steps, motion_steps, action_steps, guidance"),
     ],
 )
 def test_what_an_installed_model_cannot_be_set_to_is_told(

@@ -87,7 +87,8 @@ def as_timeline(generator: Generator[Any], request: Request) -> Request:
         movements = joined_movements(_leaping(movements), request.seed)
     alone = not (request.kept or request.free or request.recording or request.timeline)
     if not movements and alone and request.frames is None:
-        request = replace(request, frames=_only_frames(generator.limits, request.text.said))
+        only = _only_frames(generator.limits, request.text.said) if action_of(request.text) else None
+        request = replace(request, frames=only)
     if not (movements and alone and generator.limits.keeps):
         return request
     generator.limits.check(request)
