@@ -12,7 +12,7 @@ import re
 from marey.text.action_reader import named_actions
 from marey.text.clause_parts import begins_with_verb
 from marey.vocabulary.bearing_words import stated_bearings
-from marey.vocabulary.lengths import TO_TEN, WHOLE, verb_forms
+from marey.vocabulary.lengths import TO_TEN, WHOLE, known_verb_forms
 from marey.vocabulary.scope import STANDING
 from marey.vocabulary.word_lists import load_word_lists
 
@@ -148,7 +148,7 @@ def _is_title(title: str) -> bool:
         return True
     if len(words) > MOST_TITLE_WORDS or _ARTICLE.match(title) or begins_with_verb(title):
         return False
-    return not any(word.endswith("s") and word in verb_forms() for word in words[1:])
+    return not any(word.endswith("s") and word in known_verb_forms() for word in words[1:])
 
 
 def _without_scene(text: str) -> str:
@@ -169,7 +169,7 @@ def _without_scene(text: str) -> str:
 def _is_scene(sentence: str) -> bool:
     """Return True if a sentence names a place or a person, and nothing that is done or shown."""
     words = [word.strip(" ,'\"").lower() for word in sentence.split()]
-    verbs = any(word in verb_forms() and word.endswith("s") for word in words[1:]) or begins_with_verb(sentence)
+    verbs = any(word in known_verb_forms() and word.endswith("s") for word in words[1:]) or begins_with_verb(sentence)
     named = named_actions(sentence) - {STANDING}
     noun_phrase = _SOMEBODY.match(sentence) is not None and not verbs and not _VERBLESS.intersection(words)
     if any(word.endswith("ing") for word in words) and named:

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from marey.text.action_reader import named_actions
 from marey.vocabulary.bearing_words import is_done_at_once
 from marey.vocabulary.entries import load_vocabulary
-from marey.vocabulary.lengths import verb_forms
+from marey.vocabulary.lengths import known_verb_forms
 
 MOST_WORDS = 4
 """Words of a part without a verb at its beginning: "arm circles", "right hook"."""
@@ -136,7 +136,7 @@ def begins_with_verb(text: str) -> bool:
     first = re.match(r"[a-z]+", _SUBJECT.sub("", text).lower())
     if first is None or first[0].endswith("ing"):
         return False
-    return first[0] in verb_forms() or first[0].rstrip("s") in CHANGES
+    return first[0] in known_verb_forms() or first[0].rstrip("s") in CHANGES
 
 
 def _is_short_name(text: str) -> bool:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import threading
-from collections import OrderedDict
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from marey.text.encoders import Encoding, TextEncoder
+from marey.text.kept_texts import KeptTexts
 from marey.text.parsed import without_punctuation
 
 KEPT_TEXTS = 8192
@@ -21,7 +21,7 @@ class EncodedTexts:
 
     def __init__(self, encoder: TextEncoder) -> None:
         self._encoder = encoder
-        self._kept: OrderedDict[str, NDArray[np.float32]] = OrderedDict()
+        self._kept = KeptTexts[NDArray[np.float32]](KEPT_TEXTS)
         self._lock = threading.Lock()
 
     def encode(self, text: str) -> Encoding:
@@ -38,13 +38,4 @@ class EncodedTexts:
         """Return the sentence vectors (W,) of texts without the punctuation at their ends."""
         stripped = [without_punctuation(text) for text in texts]
         with self._lock:
-            found = {text: self._kept[text] for text in stripped if text in self._kept}
-            missing = [text for text in dict.fromkeys(stripped) if text not in found]
-            if missing:
-                found.update(zip(missing, self._encoder.pooled(missing), strict=True))
-            for text, vector in found.items():
-                self._kept[text] = vector
-                self._kept.move_to_end(text)
-            while len(self._kept) > KEPT_TEXTS:
-                self._kept.popitem(last=False)
-        return [found[text] for text in stripped]
+            return self._kept.get(stripped, lambda missing: list(self._encoder.pooled(missing)))

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import Generic, TypeVar
 
 KEPT = 1024
-"""Texts that are kept."""
+"""Texts that are kept where nothing else is said."""
 
 
 V = TypeVar("V")
@@ -17,7 +17,9 @@ V = TypeVar("V")
 class KeptTexts(Generic[V]):
     """Values of texts, of which the latest are kept."""
 
-    def __init__(self) -> None:
+    def __init__(self, most: int = KEPT) -> None:
+        """`most`: texts whose values are kept."""
+        self._most = most
         self._kept: OrderedDict[str, V] = OrderedDict()
         self._lock = threading.Lock()
 
@@ -36,6 +38,6 @@ class KeptTexts(Generic[V]):
             for text, value in values.items():
                 self._kept[text] = value
                 self._kept.move_to_end(text)
-            while len(self._kept) > KEPT:
+            while len(self._kept) > self._most:
                 self._kept.popitem(last=False)
         return [values[text] for text in texts]

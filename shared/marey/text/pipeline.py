@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -27,7 +28,7 @@ from marey.text.graph import Node, SemanticGraph, build_graph
 from marey.text.guard import changed_but_aligned, changed_meaning, lost_meaning
 from marey.text.held_hand import with_hand_again
 from marey.text.in_place_words import with_plain_gait_in_place
-from marey.text.kept_texts import KeptTexts
+from marey.text.kept_texts import KEPT, KeptTexts
 from marey.text.keys import NO_LABELLER, feature_key
 from marey.text.known_verbs import with_known_verbs
 from marey.text.labellers import OneAtATime
@@ -59,6 +60,7 @@ TOGETHER = 64
 """Prompts whose texts are encoded together."""
 
 
+@lru_cache(maxsize=KEPT)
 def _in_known_words(prompt: str) -> str:
     """Return a prompt as the readers know it: in the order of time, with the words that it leaves out, without those
     that mislead them, and with plain words of ways that wind and of gaits in place."""

@@ -24,7 +24,7 @@ from marey.vocabulary.counts import stated_strokes, strokes_before, strokes_behi
 from marey.vocabulary.held_poses import held_words
 from marey.vocabulary.hurt_legs import hurt_leg
 from marey.vocabulary.inflection import verb_forms
-from marey.vocabulary.lengths import verb_forms as verb_forms_known
+from marey.vocabulary.lengths import known_verb_forms
 from marey.vocabulary.meanwhile import AT_ONCE, JOINS_AHEAD, WAYS, is_on_a_way, spans_at_once
 from marey.vocabulary.sheaths import drawing_hand
 from marey.vocabulary.word_lists import load_word_lists
@@ -337,7 +337,7 @@ def _without_joint(part: str) -> str:
 def _acts(text: str) -> bool:
     """Return True if something else is done in a text than bearing oneself in some way."""
     named = named_by_adjectives().match(text.lower())
-    if named is not None and named["noun"] not in verb_forms_known():
+    if named is not None and named["noun"] not in known_verb_forms():
         return False
     return says_more(BarePrompt.of(text.strip(" ,;.")).text)
 

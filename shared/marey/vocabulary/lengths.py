@@ -52,6 +52,7 @@ _FIRST = re.compile(r"^(?:right |just |shortly )?(?:after|before|once|when)\b(?P
 """A first clause that says when the others come: "after clapping for two seconds, she bows"."""
 _LISTED = re.compile(r"(?:,|\band\b)(?:\s+and)?\s+(?:(?:he|she|they)\s+)?(?:\w+ly\s+)?(?=(?P<verb>[a-z]+)\b)")
 """Separators of the clauses of a list, before the verb of the next one."""
+_WORD = re.compile(r"[^\W\d_]{2}")
 _NAMED_PARTS = frozenset({"back", "face", "head", "hand", "arms", "legs", "feet", "hands"})
 """Parts of the body whose names are forms of verbs: "sits for eight seconds, back straight"."""
 _HERE = "\0"
@@ -125,9 +126,6 @@ def stated_length(prompt: str) -> StatedLength:
     return StatedLength(sum(map(_seconds, found)))
 
 
-_WORD = re.compile(r"[^\W\d_]{2}")
-
-
 def only_length(prompt: str) -> float | None:
     """Return the seconds of the one length that a prompt of one movement names, wherever it stands; None = it names
     none, or several: "sprint start, then full speed, 3 seconds" has three."""
@@ -170,14 +168,14 @@ def _listed(part: str) -> Iterator[str]:
     if not here or not own:
         yield part
         return
-    begins = [found for found in _LISTED.finditer(after) if found["verb"] in verb_forms()]
+    begins = [found for found in _LISTED.finditer(after) if found["verb"] in known_verb_forms()]
     edges = [0, *(found.start() for found in begins), len(after)]
     yield before + after[: edges[1]]
     yield from (after[low:high] for low, high in pairwise(edges[1:]))
 
 
 @lru_cache(maxsize=1)
-def verb_forms() -> frozenset[str]:
+def known_verb_forms() -> frozenset[str]:
     """Return the forms without an ending, and those with -s, of all verbs that are known."""
     lists = load_word_lists()
     phrases = [phrase for each in load_vocabulary().actions.values() for phrase in (*each.verbs, *each.near)]
