@@ -38,12 +38,13 @@ from marey.text.sequence_reader import (
     way_to_rest,
 )
 from marey.text.told_apart import told_apart
-from marey.vocabulary.bearing_words import BarePrompt, as_written, parts_by_gestures, says_more
+from marey.vocabulary.bearing_words import BarePrompt, as_written, parts_by_gestures
 from marey.vocabulary.bearings import FEET
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.gazes import only_gaze, stated_gaze, without_gaze
 from marey.vocabulary.lengths import is_length, stated_length
 from marey.vocabulary.scope import STANDING
+from marey.vocabulary.who_acts import says_more
 
 SURELY, SURELY_AGREED = 0.9, 0.4
 """Probabilities from which on there is no doubt about an action, and about the only one that the words name."""

@@ -1,7 +1,7 @@
 """How a prompt has the body bear itself beside its action: "like a zombie", "sadly", "with arms crossed", "salutes".
 
 The words and poses are in `bearings.toml`, those of small acts of head and hands in `small_acts.toml`;
-`marey.vocabulary.bearing_words` finds them in a prompt.
+`marey.vocabulary.bearing_spans` finds them in a prompt.
 """
 
 from __future__ import annotations

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from marey.generation.bearing import BorneSpan, borne, borne_spans
+from marey.generation.bearing import BorneSpan, borne_spans
+from marey.generation.bearing_drawing import borne
 from marey.generation.fine_wish import FineWish
 from marey.generation.gaits import shifting
 from marey.generation.port import Request
@@ -15,8 +16,8 @@ from marey.generation.stated import stated_features
 from marey.motion.features import HUMANML3D_263
 from marey.vocabulary.bearing_words import stated_bearings
 from marey.vocabulary.bearings import load_bearings
+from tests.support.bearings import OnceMade
 from tests.support.bodies import Body
-from tests.unit.generating.test_bearing import OnceMade
 from tests.unit.generating.test_timelines import text_of
 
 LAYOUT = HUMANML3D_263

@@ -7,7 +7,8 @@ from functools import partial
 from typing import Any
 
 from marey.generation.asked import changes_of, draws, draws_bearings
-from marey.generation.bearing import actions_alone, borne, borne_spans, with_bearing
+from marey.generation.bearing import actions_alone, borne_spans, with_bearing
+from marey.generation.bearing_drawing import borne
 from marey.generation.gazing import with_gaze
 from marey.generation.living import with_life
 from marey.generation.loaded import with_load
