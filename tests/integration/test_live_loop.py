@@ -35,7 +35,6 @@ from marey.streams.frames import Frame
 from marey.streams.notifier import StreamNotifier
 from marey.streams.redis import LEASE_MS
 from marey.streams.rewrites import PromptRewrite
-from marey.streams.states import STREAM_TRANSITIONS
 from marey.text.features import TextFeatures
 from tests.support.live_loop import LiveWorker, Studio, parse
 from tests.support.models import load, random_bundle
@@ -510,35 +509,6 @@ def test_a_stop_does_not_wait_for_a_prompt_that_is_being_read(studio: Studio, st
     studio.send(stream, StreamControl("stop"))
     studio.until(lambda: studio.row(stream).state is StreamState.ENDED, "the end")
     rewriter.go.set()
-
-
-@pytest.mark.parametrize("before", StreamState)
-@pytest.mark.parametrize("after", StreamState)
-def test_the_database_allows_the_transitions_of_the_code(
-    studio: Studio, engine: sa.Engine, before: StreamState, after: StreamState
-) -> None:
-    stream = studio.begin()
-    ways = {
-        StreamState.WAITING: [],
-        StreamState.LIVE: [StreamState.LIVE],
-        StreamState.PAUSED: [StreamState.LIVE, StreamState.PAUSED],
-        StreamState.ENDED: [StreamState.ENDED],
-        StreamState.FAILED: [StreamState.FAILED],
-    }
-    for state in ways[before]:
-        move(engine, stream, state)
-    if before is after or after in STREAM_TRANSITIONS[before]:
-        move(engine, stream, after)
-    else:
-        with pytest.raises(sa.exc.DBAPIError, match="a stream may not go"):
-            move(engine, stream, after)
-
-
-def move(engine: sa.Engine, stream: UUID, state: StreamState) -> None:
-    ended = "coalesce(ended_at, now())" if state in (StreamState.ENDED, StreamState.FAILED) else "NULL"
-    with engine.begin() as conn:
-        query = sa.text(f"UPDATE stream SET state = :state, ended_at = {ended} WHERE id = :id")
-        conn.execute(query, {"state": state, "id": stream})
 
 
 def actions_of(studio: Studio, stream: UUID) -> list[ActionStart]:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import random
 from dataclasses import dataclass
 
-from marey.drawing.flights import StandingFoot, on_feet
+from marey.drawing.flights import StandingFeet, on_feet
 from marey.drawing.gesture import Gesture
 from marey.drawing.postures import FootPlace, HandPlace, Point, Posture
 from marey.drawing.sequels import Sequel
@@ -34,7 +34,7 @@ class _Swing:
     starts: float
     high: float
 
-    def sequel(self, feet: dict[str, StandingFoot]) -> Sequel:
+    def sequel(self, feet: StandingFeet) -> Sequel:
         """The postures over the feet of an idle: the ball comes from the left."""
         apart = {LEFT: FootPlace((0.2, 0.07, 0.02)), RIGHT: FootPlace((0.2, 0.07, 0.0))}
         done = Sequel([self.starts])

@@ -9,7 +9,7 @@ import random
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from marey.drawing.flights import StandingFoot, on_feet
+from marey.drawing.flights import StandingFeet, on_feet
 from marey.drawing.gesture import SIDES, Gesture
 from marey.drawing.postures import FootPlace, HandPlace, Posture
 from marey.drawing.sequels import Sequel
@@ -166,7 +166,7 @@ def dance_basic(rng: random.Random, name: str, *, seconds: float | None = None, 
     lasts = seconds or (4.0 if brief else rng.uniform(6.0, 8.0))
     rounds = max(round((lasts - starts - 0.8) / once), 1)
 
-    def sequel(feet: dict[str, StandingFoot]) -> Sequel:
+    def sequel(feet: StandingFeet) -> Sequel:
         done = Sequel([starts])
         at: dict[str, _Place] = {side: (0.0, feet[side].forward) for side in SIDES}
         for _ in range(rounds):

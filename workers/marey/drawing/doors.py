@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import random
 
-from marey.drawing.flights import StandingFoot, on_feet
+from marey.drawing.flights import StandingFeet, on_feet
 from marey.drawing.gesture import Gesture
 from marey.drawing.postures import HandPlace, Point, Posture
 from marey.drawing.sequels import Sequel
 from marey.posing.standing import LEFT, RIGHT
 
-_Feet = dict[str, StandingFoot]
 _HANDLE = 1.0
 """Metres of a handle over the floor."""
 _PULLS: Point = (0.9, -0.7, -0.5)
@@ -29,7 +28,7 @@ def pulled_door(rng: random.Random, side: str = "", *, heavy: bool = False, brie
     pace, starts = rng.uniform(0.95, 1.08) * (1.35 if heavy else 1.0), 0.08 if brief else rng.uniform(0.25, 0.45)
     far, leans = rng.uniform(0.4, 0.48), -8.0 if heavy else -2.0
 
-    def sequel(feet: _Feet) -> Sequel:
+    def sequel(feet: StandingFeet) -> Sequel:
         rests = {one: foot.flat() for one, foot in feet.items()}
         stepped = {LEFT: feet[LEFT].flat(), RIGHT: feet[RIGHT].flat(-far)}
         closed = {LEFT: feet[LEFT].flat(-far + 0.04), RIGHT: feet[RIGHT].flat(-far)}
@@ -72,7 +71,7 @@ def pushed_door(
     stride, leans = rng.uniform(0.46, 0.54), 16.0 if heavy or both else 5.0
     sides = (LEFT, RIGHT) if heavy or both else (RIGHT,)
 
-    def sequel(feet: _Feet) -> Sequel:
+    def sequel(feet: StandingFeet) -> Sequel:
         rests = {one: foot.flat() for one, foot in feet.items()}
         ahead = {LEFT: feet[LEFT].flat(stride), RIGHT: feet[RIGHT].tiptoe(24)}
         through = {LEFT: feet[LEFT].flat(stride), RIGHT: feet[RIGHT].flat(1.55 * stride)}

@@ -5,13 +5,12 @@ from __future__ import annotations
 import random
 from dataclasses import replace
 
-from marey.drawing.flights import StandingFoot, on_feet
+from marey.drawing.flights import StandingFeet, on_feet
 from marey.drawing.gesture import SIDES, Gesture
 from marey.drawing.postures import FootPlace, HandPlace, Point, Posture
 from marey.drawing.sequels import Sequel, both
 from marey.posing.standing import LEFT, RIGHT
 
-_Feet = dict[str, StandingFoot]
 _DOWN: Point = (0.5, -1.0, -0.2)
 _SHELVES = {"high": 0.3, "": 0.06, "low": -0.22}
 """Metres of the wrists over the shoulders when the load is put down."""
@@ -35,7 +34,7 @@ def shelf_lift(rng: random.Random, height: str = "", *, heavy: bool = True) -> G
     chest = both(HandPlace((width, -0.08, 0.26), "shoulder", (0.8, -1.0, 0.0)))
     put = both(HandPlace((width, up, 0.44 if up < 0.2 else 0.36), "shoulder", (0.8, -1.0, 0.1)))
 
-    def sequel(feet: _Feet) -> Sequel:
+    def sequel(feet: StandingFeet) -> Sequel:
         stance = {side: replace(foot, out=foot.out + 0.05).flat() for side, foot in feet.items()}
         wide: dict[str, Point] = dict.fromkeys(SIDES, (0.45, 0.1, 1.0))
         down = Posture((0.0, 0.52, -0.14), (34, 0, 0), (22, 0, 0), (-30, 0, 0), hands=below, feet=stance, knees=wide)
@@ -76,7 +75,7 @@ def shoe_tied(rng: random.Random, side: str = "", *, both_shoes: bool = False) -
     first, pace, starts = side or rng.choice(SIDES), rng.uniform(0.95, 1.12), rng.uniform(0.2, 0.5)
     rounds, ahead, behind = rng.choice((2, 3)), 0.3, -0.34
 
-    def hands(feet: _Feet, lifted: float, apart: float) -> dict[str, HandPlace]:
+    def hands(feet: StandingFeet, lifted: float, apart: float) -> dict[str, HandPlace]:
         """Wrists over the front foot, which is the left one."""
         out, far = feet[LEFT].out, ahead + feet[LEFT].forward + 0.02
         here = (out + apart, 0.16 + lifted, far)
@@ -86,7 +85,7 @@ def shoe_tied(rng: random.Random, side: str = "", *, both_shoes: bool = False) -
             RIGHT: HandPlace(there, "floor", (1.0, 0.1, -0.3)),
         }
 
-    def sequel(feet: _Feet) -> Sequel:
+    def sequel(feet: StandingFeet) -> Sequel:
         planted = feet[LEFT].flat(ahead)
         half = Posture(
             (0.0, 0.72, 0.02),
@@ -122,7 +121,7 @@ def shoe_tied(rng: random.Random, side: str = "", *, both_shoes: bool = False) -
         done.then(0.6, Posture((0.0, 0.94, 0.0), feet={side: foot.flat() for side, foot in feet.items()}))
         return done
 
-    def twice(feet: _Feet) -> Sequel:
+    def twice(feet: StandingFeet) -> Sequel:
         done = sequel(feet)
         swapped = {LEFT: replace(feet[RIGHT], side=LEFT), RIGHT: replace(feet[LEFT], side=RIGHT)}
         more = sequel(swapped).mirrored()
@@ -146,7 +145,7 @@ def curtsy(rng: random.Random, side: str = "", times: int | None = None) -> Gest
     skirt = both(HandPlace((0.24, -0.4, 0.06), "shoulder", (0.8, 0.2, -0.8)))
     spread = both(HandPlace((0.34, -0.3, 0.08), "shoulder", (0.6, 0.4, -0.8)))
 
-    def sequel(feet: _Feet) -> Sequel:
+    def sequel(feet: StandingFeet) -> Sequel:
         crossed = {LEFT: feet[LEFT].flat(), RIGHT: replace(feet[RIGHT], out=-0.14).tiptoe(heel, -0.26)}
         held = Posture((0.0, 0.94, 0.0), hands=skirt)
         stepped = Posture((0.03, 0.9, -0.05), (3, 0, 0), (2, 0, 0), hands=spread, feet=crossed)
@@ -183,7 +182,7 @@ def cower(rng: random.Random, seconds: float | None = None) -> Gesture:
     }
     knees: dict[str, Point] = {LEFT: (0.1, 0.1, 1.0), RIGHT: (0.1, 0.1, 1.0)}
 
-    def sequel(feet: _Feet) -> Sequel:
+    def sequel(feet: StandingFeet) -> Sequel:
         back = {LEFT: feet[LEFT].flat(), RIGHT: feet[RIGHT].tiptoe(34, -0.28)}
         shrinks = Posture((0.0, 0.84, -0.18), (0, 0, -6), (14, 4, -10), (14, 0, -6), hands=shield, feet=back)
         down = Posture((0.0, low, -0.2), (16, 0, -8), (38, 6, -14), (22, 0, -8), hands=shield, feet=back, knees=knees)

@@ -55,7 +55,11 @@ class StandingFoot:
         return (self.towards[0] * math.cos(pitch), -math.sin(pitch), self.towards[1] * math.cos(pitch))
 
 
-def standing_feet(body: StandingBody) -> dict[str, StandingFoot]:
+StandingFeet = dict[str, StandingFoot]
+"""Both feet of an idle by side."""
+
+
+def standing_feet(body: StandingBody) -> StandingFeet:
     """Measure the feet of an idle by side; see `StandingFoot`."""
     joints = body.joints
     middle = joints[:, [7, 8]].mean((0, 1))
@@ -100,7 +104,7 @@ def fly(
 
 
 def on_feet(
-    sequel: Callable[[dict[str, StandingFoot]], Sequel],
+    sequel: Callable[[StandingFeet], Sequel],
     kinds: Sequence[str],
     after: float,
     *,
@@ -129,3 +133,16 @@ def on_feet(
 
     seconds = sequel({one: StandingFoot(one, 0.09, 0.0, (0.2, 0.98)) for one in _LEGS}).times[-1]
     return Gesture(seconds + after, tuple(filter(None, kinds)), change, side, times)
+
+
+def stride_ahead(feet: StandingFeet, far: float, heel: float = 0.0, rear: float = 0.0) -> dict[str, FootPlace]:
+    """Return both feet, the left one `far` metres ahead, the heel of the right one lifted until the foot points down by
+    `heel` degrees."""
+    back = feet[RIGHT].tiptoe(heel, rear) if heel else feet[RIGHT].flat(rear)
+    return {LEFT: feet[LEFT].flat(far), RIGHT: back}
+
+
+def come_together(done: Sequel, feet: StandingFeet, at: float = 0.0) -> Sequel:
+    """Add the end of a movement: the feet come together, metres forward of where they stood, and the body stands."""
+    done.then(0.6, Posture((0.0, 0.94, at), feet={side: foot.flat(at) for side, foot in feet.items()}))
+    return done

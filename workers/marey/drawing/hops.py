@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.drawing.flights import StandingFoot, fly, on_feet
+from marey.drawing.flights import StandingFeet, StandingFoot, fly, on_feet
 from marey.drawing.gesture import SIDES, Gesture
 from marey.drawing.postures import STAND, FootPlace, HandPlace, Posture
 from marey.drawing.sequels import Sequel, both, near
@@ -97,7 +97,7 @@ class _Hops:
         self.more = [rng.uniform(0.93, 1.07) for _ in range(self.times)]
         self.after = rng.uniform(0.3, 0.7)
 
-    def sequel(self, feet: dict[str, StandingFoot]) -> Sequel:
+    def sequel(self, feet: StandingFeet) -> Sequel:
         """The postures over the feet of an idle."""
         on, done = feet[RIGHT], Sequel([self.starts])
         low = 0.92 - self.dip
@@ -287,7 +287,7 @@ class _Jumps:
         self.dip, self.crouch, self.rise = _QUICK_DIP, _QUICK_CROUCH_S, _QUICK_RISE_S
         self.back = self.arms = "bent"
 
-    def sequel(self, feet: dict[str, StandingFoot]) -> Sequel:
+    def sequel(self, feet: StandingFeet) -> Sequel:
         """The postures over the feet of an idle."""
         done = Sequel([self.starts])
         done.then(self.crouch, self._crouched(feet, 0, 0.8), 0.04)
@@ -309,7 +309,7 @@ class _Jumps:
         done.then(self.straighten, end)
         return done
 
-    def _jump(self, done: Sequel, feet: dict[str, StandingFoot], k: int) -> None:
+    def _jump(self, done: Sequel, feet: StandingFeet, k: int) -> None:
         """Add the way up to the toes and the flight of jump `k`."""
         ahead, arms = self.ahead, _SWUNG[self.arms]
         lean = 4 + 16 * ahead
@@ -329,7 +329,7 @@ class _Jumps:
         done.then(self.rise, leaving)
         fly(done, self.flight, leaving, landing, shaped)
 
-    def _crouched(self, feet: dict[str, StandingFoot], jumps: int, bent: float) -> Posture:
+    def _crouched(self, feet: StandingFeet, jumps: int, bent: float) -> Posture:
         """The posture before a jump; `bent`: share of the hips' lean that the spine leans too."""
         lean = 60 * self.dip
         hand, back = _SWUNG[self.back], 0.3 * self.dip
@@ -355,10 +355,8 @@ class _Jumps:
         """Metres ahead, up and to the left of a foot after so many jumps."""
         return jumps * self.ahead, up, jumps * self.aside
 
-    def _flat(self, feet: dict[str, StandingFoot], jumps: float) -> dict[str, FootPlace]:
+    def _flat(self, feet: StandingFeet, jumps: float) -> dict[str, FootPlace]:
         return {side: foot.flat(*self._moved(jumps)) for side, foot in feet.items()}
 
-    def _tiptoe(
-        self, feet: dict[str, StandingFoot], degrees: float, jumps: float, up: float = 0.0
-    ) -> dict[str, FootPlace]:
+    def _tiptoe(self, feet: StandingFeet, degrees: float, jumps: float, up: float = 0.0) -> dict[str, FootPlace]:
         return {side: foot.tiptoe(degrees, *self._moved(jumps, up)) for side, foot in feet.items()}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 from dataclasses import replace
 
-from marey.drawing.flights import StandingFoot, on_feet
+from marey.drawing.flights import StandingFeet, on_feet
 from marey.drawing.gesture import SIDES, Gesture
 from marey.drawing.postures import HandPlace, Point, Posture
 from marey.drawing.sequels import Sequel, both
@@ -30,7 +30,7 @@ def drop_to_knees(rng: random.Random, *, slow: bool = False, stays: float = 1.6,
     falls = rng.uniform(1.0, 1.2) if slow else rng.uniform(0.52, 0.64)
     slump, bowed, rocks = rng.uniform(12, 18), rng.uniform(12, 20), rng.uniform(1.5, 3.0)
 
-    def sequel(feet: dict[str, StandingFoot]) -> Sequel:
+    def sequel(feet: StandingFeet) -> Sequel:
         down = {side: foot.tiptoe(68) for side, foot in feet.items()}
         ankle = down[LEFT].at[2]
         half = {side: foot.tiptoe(38) for side, foot in feet.items()}

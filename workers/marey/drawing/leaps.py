@@ -6,7 +6,7 @@ import random
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from marey.drawing.flights import StandingFoot, flight_height, fly, on_feet
+from marey.drawing.flights import StandingFeet, flight_height, fly, on_feet
 from marey.drawing.gesture import SIDES, Gesture
 from marey.drawing.postures import FootPlace, HandPlace, Point, Posture
 from marey.drawing.sequels import Sequel
@@ -40,7 +40,7 @@ def running(
 
 def running_step(
     done: Sequel,
-    feet: dict[str, StandingFoot],
+    feet: StandingFeet,
     at: Mapping[str, float],
     side: str,
     step: tuple[float, float],
@@ -88,7 +88,7 @@ class _Leap:
     starts: float
     stride: float = _STRIDE
 
-    def sequel(self, feet: dict[str, StandingFoot]) -> Sequel:
+    def sequel(self, feet: StandingFeet) -> Sequel:
         """The postures over the feet of an idle."""
         done = Sequel([self.starts])
         at: Mapping[str, float] = dict.fromkeys(SIDES, 0.0)
@@ -108,7 +108,7 @@ class _Leap:
     def _running(self, pelvis: float, feet: dict[str, FootPlace], ahead: str, swing: float = 0.4) -> Posture:
         return running(pelvis, feet, ahead, swing, self._arms)
 
-    def _flight(self, done: Sequel, feet: dict[str, StandingFoot], here: float) -> None:
+    def _flight(self, done: Sequel, feet: StandingFeet, here: float) -> None:
         """Add the step onto the left foot and off it, the flight, and the landing on the right foot."""
         there = here + self.far
         drives = FootPlace((0.09, 0.42, here + 0.2), (0, -0.7, 0.7))
@@ -152,7 +152,7 @@ class _Leap:
             knees=knees,
         )
 
-    def _runs_out(self, done: Sequel, feet: dict[str, StandingFoot], there: float) -> None:
+    def _runs_out(self, done: Sequel, feet: StandingFeet, there: float) -> None:
         """Sink over the foot that landed, step on twice, and stand."""
         passing = FootPlace((0.1, 0.34, there - 0.2), (0.1, -0.8, -0.3))
         sunk = self._running(there, {RIGHT: feet[RIGHT].flat(there), LEFT: passing}, RIGHT)

@@ -5,12 +5,11 @@ from __future__ import annotations
 import random
 from dataclasses import replace
 
-from marey.drawing.flights import StandingFoot, on_feet
+from marey.drawing.flights import StandingFeet, on_feet
 from marey.drawing.gesture import SIDES, Gesture
 from marey.drawing.postures import HandPlace, Point, Posture
 from marey.drawing.sequels import Sequel, both
 
-_Feet = dict[str, StandingFoot]
 _ELBOW: Point = (0.5, -0.7, -0.8)
 _HELD = both(HandPlace((-0.02, -0.27, 0.31), "shoulder", _ELBOW))
 """Wrists of who has a load before the belly, as far apart as in all postures of these movements."""
@@ -32,7 +31,7 @@ def lift(rng: random.Random, *, heavy: bool = False) -> Gesture:
     """
     pace, starts = rng.uniform(0.95, 1.1) * (1.2 if heavy else 1.0), rng.uniform(0.2, 0.4)
 
-    def sequel(feet: _Feet) -> Sequel:
+    def sequel(feet: StandingFeet) -> Sequel:
         down, half, held = _stages(feet)
         done = Sequel([starts])
         done.carried(0.85 * pace, down, 0.25 * pace)
@@ -56,7 +55,7 @@ def put_down(rng: random.Random, onto: str = "floor", *, drops: bool = False) ->
     """
     pace = rng.uniform(0.95, 1.1)
 
-    def sequel(feet: _Feet) -> Sequel:
+    def sequel(feet: StandingFeet) -> Sequel:
         down, half, held = _stages(feet)
         done = Sequel([0.0], [held])
         done.then(0.5, held)
@@ -75,7 +74,7 @@ def put_down(rng: random.Random, onto: str = "floor", *, drops: bool = False) ->
     return on_feet(sequel, ["pick-put", "load-put"], rng.uniform(0.4, 0.7))
 
 
-def _stages(feet: _Feet) -> tuple[Posture, Posture, Posture]:
+def _stages(feet: StandingFeet) -> tuple[Posture, Posture, Posture]:
     """Return the postures of a load on the floor, on its way and before the belly."""
     stance = {side: foot.flat() for side, foot in feet.items()}
     wide: dict[str, Point] = dict.fromkeys(SIDES, (0.4, 0.1, 1.0))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 from dataclasses import dataclass, replace
 
-from marey.drawing.flights import StandingFoot, on_feet
+from marey.drawing.flights import StandingFeet, on_feet
 from marey.drawing.gesture import SIDES, Gesture
 from marey.drawing.postures import STAND, FootPlace, HandPlace, Point, Posture
 from marey.drawing.sequels import Sequel, both
@@ -48,7 +48,7 @@ class _Lunge:
     hands: str
     holds: float
 
-    def posture(self, pelvis: Point, feet: dict[str, StandingFoot], places: dict[str, tuple[float, float]]) -> Posture:
+    def posture(self, pelvis: Point, feet: StandingFeet, places: dict[str, tuple[float, float]]) -> Posture:
         """The posture with feet by side at metres forward and with degrees of a heel that is lifted."""
         put = {
             side: feet[side].tiptoe(heel, at) if heel else feet[side].flat(at) for side, (at, heel) in places.items()
@@ -58,11 +58,11 @@ class _Lunge:
         lean = self.lean if pelvis[1] < 0.85 else 0.4 * self.lean
         return Posture(pelvis, (lean, 0, 0), (0.5 * lean, 0, 0), (-lean, 0, 0), 1.0, self._arms(), put, knees)
 
-    def stands(self, feet: dict[str, StandingFoot], at: float) -> Posture:
+    def stands(self, feet: StandingFeet, at: float) -> Posture:
         """Upright with both feet `at` metres forward."""
         return self.posture((0.0, 0.94, at), feet, dict.fromkeys(SIDES, (at, 0.0)))
 
-    def down(self, done: Sequel, feet: dict[str, StandingFoot], front: str, rear: float) -> None:
+    def down(self, done: Sequel, feet: StandingFeet, front: str, rear: float) -> None:
         """Step with one foot, ahead or back, and go down; the rear foot is at `rear` metres forward."""
         moves = OTHER_SIDE[front] if self.form == "back" else front
         ahead = rear + self.stride
@@ -72,13 +72,13 @@ class _Lunge:
         done.then(0.5 * self.pace, self.posture((0.0, 0.8, rear + share * self.stride), feet, half))
         done.then(0.42 * self.pace, self.posture((0.0, self.low, ahead - _THIGH + _SHIN), feet, deep), self.holds)
 
-    def up(self, done: Sequel, feet: dict[str, StandingFoot], front: str, rear: float) -> None:
+    def up(self, done: Sequel, feet: StandingFeet, front: str, rear: float) -> None:
         """Push up on both feet."""
         places = {front: (rear + self.stride, 0.0), OTHER_SIDE[front]: (rear, 38.0)}
         share = {"ahead": 0.45, "back": 0.7, "walking": 0.75}[self.form]
         done.then(0.38 * self.pace, self.posture((0.0, 0.8, rear + share * self.stride), feet, places))
 
-    def aside(self, done: Sequel, feet: dict[str, StandingFoot], side: str) -> None:
+    def aside(self, done: Sequel, feet: StandingFeet, side: str) -> None:
         """Step to a side, go down over that foot while the other leg stays straight, and push back."""
         foot, stays, out = feet[side], feet[OTHER_SIDE[side]].flat(0.0), SIGN[side]
         at = FootPlace((foot.out + _ASIDE_M, foot.flat().at[1], foot.forward))
@@ -116,7 +116,7 @@ def lunges(
     return on_feet(lambda feet: _sequel(way, fronts, starts, feet), ["lunges"], after, side=side, times=times)
 
 
-def _sequel(way: _Lunge, fronts: list[str], starts: float, feet: dict[str, StandingFoot]) -> Sequel:
+def _sequel(way: _Lunge, fronts: list[str], starts: float, feet: StandingFeet) -> Sequel:
     """The postures over the feet of an idle, with the front legs one after another."""
     done, at = Sequel([starts]), 0.0
     if _HANDS[way.hands]:

@@ -5,13 +5,12 @@ from __future__ import annotations
 import random
 from dataclasses import replace
 
-from marey.drawing.flights import StandingFoot, on_feet
+from marey.drawing.flights import StandingFeet, on_feet
 from marey.drawing.gesture import SIDES, Gesture
 from marey.drawing.postures import HandPlace, Point, Posture
 from marey.drawing.sequels import Sequel, both
 from marey.posing.standing import LEFT, OTHER_SIDE, RIGHT
 
-_Feet = dict[str, StandingFoot]
 _DOWN: Point = (0.6, -1.0, -0.3)
 _KNEES: dict[str, Point] = dict.fromkeys(SIDES, (0.45, 0.1, 1.0))
 
@@ -30,7 +29,7 @@ def peek(rng: random.Random, side: str = "", *, low: bool = False, looks: bool =
     lean, up = rng.uniform(17, 21), 0.62 if low else 0.9
     level = 1.0 if looks else 0.4
 
-    def sequel(feet: _Feet) -> Sequel:
+    def sequel(feet: StandingFeet) -> Sequel:
         """Lean to the right."""
         wide = {LEFT: feet[LEFT].flat(), RIGHT: replace(feet[RIGHT], out=feet[RIGHT].out + 0.16).flat()}
         pitch = 16.0 if low else 3.0
@@ -77,7 +76,7 @@ def catch(rng: random.Random, side: str = "", *, high: bool = False) -> Gesture:
         "held": HandPlace((-0.08, -0.28, 0.22), "shoulder", _DOWN),
     }
 
-    def sequel(feet: _Feet) -> Sequel:
+    def sequel(feet: StandingFeet) -> Sequel:
         hands = {name: dict.fromkeys(acting, place) for name, place in way.items()}
         if side:
             free = HandPlace((0.18, -0.4, 0.12), "shoulder", _DOWN)

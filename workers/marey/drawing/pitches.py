@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 from collections.abc import Callable
 
-from marey.drawing.flights import StandingFoot, on_feet
+from marey.drawing.flights import StandingFeet, on_feet
 from marey.drawing.gesture import Gesture
 from marey.drawing.postures import FootPlace, HandPlace, Point, Posture
 from marey.drawing.sequels import Sequel
@@ -33,10 +33,10 @@ def pitch(rng: random.Random, side: str = "") -> Gesture:
     return on_feet(sequel, ["throw", "pitch"], rng.uniform(0.3, 0.6), side=side or RIGHT, mirror=side == LEFT)
 
 
-def _pitched(stride: float, pace: float, starts: float, knee: float) -> Callable[[dict[str, StandingFoot]], Sequel]:
+def _pitched(stride: float, pace: float, starts: float, knee: float) -> Callable[[StandingFeet], Sequel]:
     """Return the postures of a pitch with the right hand over the feet of an idle; `knee`: metres over the floor."""
 
-    def sequel(feet: dict[str, StandingFoot]) -> Sequel:
+    def sequel(feet: StandingFeet) -> Sequel:
         pivot = FootPlace((0.07, 0.07, 0.0), (1.0, -0.45, 0.2))  # across the way of the ball
         at = Posture((0.0, 0.93, 0.0), (4, 0, -10), (4, 0, -6), hands={RIGHT: _BALL, LEFT: _GLOVE})
         rocks = Posture(

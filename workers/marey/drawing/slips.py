@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from marey.drawing.falls import on_back
-from marey.drawing.flights import StandingFoot, on_feet
+from marey.drawing.flights import StandingFeet, on_feet
 from marey.drawing.gesture import SIDES, Gesture
 from marey.drawing.postures import FootPlace, HandPlace, Point, Posture
 from marey.drawing.sequels import Sequel
@@ -69,10 +69,10 @@ def slip_caught(rng: random.Random) -> Gesture:
     return on_feet(_caught(far, starts, pace), ["stumble", "slip"], rng.uniform(0.4, 0.7), mirror=rng.random() < 0.5)
 
 
-def _caught(far: float, starts: float, pace: float) -> Callable[[dict[str, StandingFoot]], Sequel]:
+def _caught(far: float, starts: float, pace: float) -> Callable[[StandingFeet], Sequel]:
     """Return the postures of a slip that is caught, over the feet of an idle."""
 
-    def sequel(feet: dict[str, StandingFoot]) -> Sequel:
+    def sequel(feet: StandingFeet) -> Sequel:
         def slid(forward: float, heel: float = 0.0) -> dict[str, FootPlace]:
             ahead = replace(feet[LEFT].flat(forward), drags=True, toes=_SLIDES if forward > 0.2 else None)
             return {LEFT: ahead, RIGHT: feet[RIGHT].tiptoe(heel) if heel else feet[RIGHT].flat()}

@@ -1,4 +1,4 @@
-"""Movements of sports: a serve, throws of javelin, discus, shot, frisbee and bowling ball, a jump shot, a lunge.
+"""Movements of sports: a tennis serve, bowling, a jump shot, a lunge of fencing.
 
 They are drawn for the right hand, and mirrored for the left one.
 """
@@ -6,16 +6,14 @@ They are drawn for the right hand, and mirrored for the left one.
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-from marey.drawing.flights import StandingFoot, fly, on_feet
+from marey.drawing.flights import StandingFeet, come_together, fly, on_feet, stride_ahead
 from marey.drawing.gesture import Gesture
 from marey.drawing.postures import FootPlace, HandPlace, Point, Posture
 from marey.drawing.sequels import Sequel, both
 from marey.posing.standing import LEFT, RIGHT
 
-_Feet = dict[str, StandingFoot]
 _OUT: Point = (1.0, -0.4, -0.2)
 _DOWN: Point = (0.5, -1.0, -0.2)
 _BACK: Point = (0.6, -0.3, -0.9)
@@ -35,8 +33,8 @@ def tennis_serve(rng: random.Random, side: str = "") -> Gesture:
     pace, stride, turn = rng.uniform(0.95, 1.12), rng.uniform(0.26, 0.34), rng.uniform(34, 44)
     starts = rng.uniform(0.25, 0.5)
 
-    def sequel(feet: _Feet) -> Sequel:
-        stance = _stride(feet, stride)
+    def sequel(feet: StandingFeet) -> Sequel:
+        stance = stride_ahead(feet, stride)
         ready = Posture(
             (0.0, 0.93, 0.4 * stride),
             (4, 0, -0.6 * turn),
@@ -76,7 +74,7 @@ def tennis_serve(rng: random.Random, side: str = "") -> Gesture:
                 RIGHT: HandPlace((0.04, 0.1, -0.2), "shoulder", (1.0, 0.7, 0.1)),
             },
         )
-        raised = _stride(feet, stride, heel=30)
+        raised = stride_ahead(feet, stride, heel=30)
         struck = Posture(
             (0.0, 0.95, 0.95 * stride),
             (4, 0, 4),
@@ -98,7 +96,7 @@ def tennis_serve(rng: random.Random, side: str = "") -> Gesture:
             (18, 0, 24),
             (-18, 0, -18),
             hands={LEFT: _TUCKED, RIGHT: HandPlace((-0.32, -0.36, 0.24), "shoulder", _OUT)},
-            feet=_stride(feet, stride, heel=45),
+            feet=stride_ahead(feet, stride, heel=45),
         )
         done = Sequel([starts])
         done.then(0.6 * pace, ready, 0.25)
@@ -108,254 +106,9 @@ def tennis_serve(rng: random.Random, side: str = "") -> Gesture:
         done.then(0.17, struck)
         done.then(0.14, through)
         done.then(0.22, stopped, 0.2)
-        return _ends(done, feet)
+        return come_together(done, feet)
 
     return on_feet(sequel, ["tennis-serve"], rng.uniform(0.3, 0.6), side=side or RIGHT, mirror=side == LEFT)
-
-
-def field_throw(rng: random.Random, form: str, side: str = "") -> Gesture:
-    """A throw of a javelin or discus, a put of a shot, or a backhand throw of a frisbee.
-
-    Args:
-        rng: decides sizes and times.
-        form: `javelin`, `discus`, `shot` or `frisbee`.
-        side: of the hand that throws; empty = right.
-
-    Raises:
-        KeyError: no such form.
-    """
-    draw = _FIELD[form](rng)
-    after = rng.uniform(0.3, 0.6)
-    return on_feet(draw, ["throw", form], after, side=side or RIGHT, mirror=side == LEFT)
-
-
-def _javelin(rng: random.Random) -> Callable[[_Feet], Sequel]:
-    pace, step, starts = rng.uniform(0.95, 1.1), rng.uniform(0.5, 0.58), rng.uniform(0.2, 0.4)
-    drawn = HandPlace((0.2, 0.12, -0.44), "shoulder", _OUT)
-    carried = HandPlace((0.12, 0.2, -0.06), "shoulder", (1.0, -0.2, -0.3))
-
-    def way(feet: _Feet, left: float, right: float, hands: dict[str, HandPlace], turn: float, heel: str) -> Posture:
-        at = {LEFT: left, RIGHT: right}
-        put = {one: feet[one].tiptoe(28, at[one]) if one == heel else feet[one].flat(at[one]) for one in at}
-        pelvis = (0.0, 0.9, 0.5 * (left + right))
-        return Posture(pelvis, (-3, 0, -0.5 * turn), (-4, 0, -0.5 * turn), (0, 0, 0.8 * turn), hands=hands, feet=put)
-
-    def sequel(feet: _Feet) -> Sequel:
-        first, hands = {RIGHT: carried}, {LEFT: _POINTING, RIGHT: drawn}
-        done = Sequel([starts])
-        done.then(0.5 * pace, way(feet, 0.0, 0.0, first, 0, ""), 0.1)
-        done.then(0.42 * pace, way(feet, 0.8 * step, 0.0, first, 20, RIGHT))
-        done.then(0.4 * pace, way(feet, 0.8 * step, 1.6 * step, hands, 40, LEFT))
-        done.then(0.38 * pace, way(feet, 2.7 * step, 1.6 * step, hands, 50, RIGHT))
-        ends, planted = 2.7 * step, {LEFT: feet[LEFT].flat(2.7 * step), RIGHT: feet[RIGHT].tiptoe(48, 1.75 * step)}
-        bow = Posture(
-            (0.0, 0.9, ends - 0.26),
-            (-10, 0, 4),
-            (-16, -6, 0),
-            (-4, 0, 0),
-            hands={
-                LEFT: HandPlace((0.14, -0.14, 0.3), "shoulder", _BACK),
-                RIGHT: HandPlace((0.24, 0.2, -0.22), "shoulder", (1.0, 0.4, 0.2)),
-            },
-            feet=planted,
-        )
-        let_go = replace(
-            bow,
-            pelvis=(0.0, 0.92, ends - 0.1),
-            tilt=(10, 0, 12),
-            spine=(12, -8, 12),
-            hands={LEFT: _TUCKED, RIGHT: HandPlace((0.0, 0.36, 0.34), "shoulder", _OUT)},
-        )
-        stopped = Posture(
-            (0.0, 0.84, ends + 0.24),
-            (20, 0, 20),
-            (22, 0, 18),
-            (-26, 0, -14),
-            hands={LEFT: _TUCKED, RIGHT: HandPlace((-0.26, -0.4, 0.24), "shoulder", _OUT)},
-            feet={LEFT: feet[LEFT].tiptoe(40, ends), RIGHT: feet[RIGHT].flat(ends + 0.5)},
-        )
-        done.then(0.2, bow)
-        done.then(0.16, let_go)
-        done.then(0.36, stopped, 0.2)
-        return _ends(done, feet, ends + 0.5)
-
-    return sequel
-
-
-def _discus(rng: random.Random) -> Callable[[_Feet], Sequel]:
-    pace, starts, wide = rng.uniform(0.95, 1.12), rng.uniform(0.2, 0.4), rng.uniform(0.17, 0.22)
-    swings = rng.choice((1, 2))
-
-    def sequel(feet: _Feet) -> Sequel:
-        stance = {one: replace(feet[one], out=feet[one].out + wide).flat(0.06 if one == LEFT else -0.1) for one in feet}
-        turned = {LEFT: stance[LEFT], RIGHT: replace(feet[RIGHT], out=feet[RIGHT].out + wide).tiptoe(40, -0.1)}
-
-        def wound(share: float) -> Posture:
-            hands = {
-                LEFT: HandPlace((-0.12, -0.06, 0.36), "trunk", _OUT),
-                RIGHT: HandPlace((0.46, -0.2, -0.3 * share), "trunk", _DOWN),
-            }
-            return Posture(
-                (-0.1 * share, 0.93 - 0.13 * share, 0.0),
-                (10 * share, 0, -34 * share),
-                (10 * share, 0, -50 * share),
-                (-8, 0, 24 * share),
-                hands=hands,
-                feet=stance,
-            )
-
-        left = Posture(
-            (0.06, 0.9, 0.0),
-            (8, 0, 22),
-            (6, 0, 26),
-            (-6, 0, 0),
-            hands={
-                LEFT: HandPlace((0.34, -0.16, 0.2), "trunk", _DOWN),
-                RIGHT: HandPlace((-0.14, -0.16, 0.36), "trunk", _OUT),
-            },
-            feet=stance,
-        )
-        let_go = Posture(
-            (0.12, 0.95, 0.02),
-            (-6, 0, 34),
-            (-10, 0, 10),
-            (-6, 0, -30),
-            hands={
-                LEFT: HandPlace((0.3, -0.3, -0.1), "trunk", _BACK),
-                RIGHT: HandPlace((0.36, 0.1, 0.34), "trunk", _DOWN),
-            },
-            feet=turned,
-        )
-        stopped = replace(
-            let_go,
-            tilt=(2, 0, 48),
-            spine=(4, 0, 34),
-            neck=(0, 0, -44),
-            hands={
-                LEFT: HandPlace((0.32, -0.3, -0.1), "trunk", _BACK),
-                RIGHT: HandPlace((-0.16, 0.14, 0.4), "trunk", _OUT),
-            },
-        )
-        done = Sequel([starts])
-        done.then(0.7 * pace, left)
-        for _ in range(swings):
-            done.then(0.75 * pace, wound(0.8))
-            done.then(0.75 * pace, left)
-        done.then(0.85 * pace, wound(1.0), 0.08)
-        done.then(0.4, let_go)
-        done.then(0.3, stopped, 0.25)
-        done.then(0.55 * pace, Posture((0.0, 0.93, 0.0), feet=stance))
-        return _ends(done, feet)
-
-    return sequel
-
-
-def _shot(rng: random.Random) -> Callable[[_Feet], Sequel]:
-    pace, starts, stride = rng.uniform(0.95, 1.12), rng.uniform(0.2, 0.4), rng.uniform(0.4, 0.48)
-    neck = HandPlace((-0.06, 0.05, 0.13), "shoulder", (1.0, -0.3, -0.2))
-
-    def sequel(feet: _Feet) -> Sequel:
-        held = Posture((0.0, 0.93, 0.0), (4, 0, -10), (0, 0, -10), hands={RIGHT: neck, LEFT: _LOWERED})
-        stance = {LEFT: feet[LEFT].flat(stride), RIGHT: feet[RIGHT].flat(-0.08)}
-        crouched = Posture(
-            (-0.06, 0.78, 0.02),
-            (16, 0, -46),
-            (16, 0, -36),
-            (-10, 0, 20),
-            hands={RIGHT: neck, LEFT: HandPlace((-0.1, -0.06, 0.38), "trunk", _OUT)},
-            feet=stance,
-        )
-        drives = Posture(
-            (0.0, 0.88, 0.62 * stride),
-            (-8, 0, -10),
-            (-8, 0, -6),
-            (-14, 0, 10),
-            hands={RIGHT: neck, LEFT: HandPlace((0.3, 0.0, 0.24), "trunk", _DOWN)},
-            feet=_stride(feet, stride, heel=30, rear=-0.08),
-        )
-        let_go = Posture(
-            (0.03, 0.95, 0.88 * stride),
-            (0, 0, 26),
-            (-2, -8, 22),
-            (-16, 0, -30),
-            hands={RIGHT: HandPlace((-0.02, 0.3, 0.4), "shoulder", _OUT), LEFT: _TUCKED},
-            feet=_stride(feet, stride, heel=52, rear=0.0),
-        )
-        stopped = Posture(
-            (0.0, 0.86, stride + 0.1),
-            (18, 0, 24),
-            (14, 0, 16),
-            (-20, 0, -24),
-            hands={RIGHT: HandPlace((-0.1, -0.08, 0.42), "shoulder", _OUT), LEFT: _TUCKED},
-            feet={LEFT: feet[LEFT].tiptoe(40, stride), RIGHT: feet[RIGHT].flat(stride + 0.34)},
-        )
-        done = Sequel([starts])
-        done.then(0.7 * pace, held, 0.3)
-        done.then(0.8 * pace, crouched, 0.2)
-        done.then(0.3, drives)
-        done.then(0.2, let_go, 0.06)
-        done.then(0.45, stopped, 0.2)
-        return _ends(done, feet, stride + 0.34)
-
-    return sequel
-
-
-def _frisbee(rng: random.Random) -> Callable[[_Feet], Sequel]:
-    pace, starts, stride = rng.uniform(0.95, 1.12), rng.uniform(0.2, 0.4), rng.uniform(0.26, 0.36)
-
-    def sequel(feet: _Feet) -> Sequel:
-        stance = {RIGHT: feet[RIGHT].flat(stride), LEFT: feet[LEFT].flat(0.0)}
-        held = Posture(
-            (0.0, 0.93, 0.0),
-            (4, 0, 12),
-            (2, 0, 10),
-            hands={
-                RIGHT: HandPlace((-0.12, -0.28, 0.3), "shoulder", _OUT),
-                LEFT: HandPlace((-0.04, -0.3, 0.3), "shoulder", _DOWN),
-            },
-        )
-        wound = Posture(
-            (0.04, 0.87, 0.3 * stride),
-            (8, 0, 38),
-            (8, 0, 38),
-            (-6, 0, -54),
-            hands={RIGHT: HandPlace((-0.34, -0.26, 0.16), "trunk", _OUT), LEFT: _LOWERED},
-            feet=stance,
-        )
-        let_go = Posture(
-            (0.0, 0.9, 0.85 * stride),
-            (4, 0, 4),
-            (4, 0, -8),
-            (-4, 0, 4),
-            hands={
-                RIGHT: HandPlace((0.1, -0.14, 0.46), "shoulder", _OUT),
-                LEFT: HandPlace((0.24, -0.36, -0.08), "shoulder", _BACK),
-            },
-            feet={RIGHT: stance[RIGHT], LEFT: feet[LEFT].tiptoe(30)},
-        )
-        stopped = replace(
-            let_go,
-            tilt=(2, 0, -8),
-            spine=(2, 0, -20),
-            neck=(-4, 0, 22),
-            hands={RIGHT: HandPlace((0.36, 0.02, 0.3), "shoulder", _DOWN), LEFT: let_go.hands[LEFT]},
-        )
-        done = Sequel([starts])
-        done.then(0.6 * pace, held, 0.25)
-        done.then(0.65 * pace, wound, 0.12)
-        done.then(0.24, let_go)
-        done.then(0.24, stopped, 0.3)
-        return _ends(done, feet)
-
-    return sequel
-
-
-_FIELD: Mapping[str, Callable[[random.Random], Callable[[_Feet], Sequel]]] = {
-    "javelin": _javelin,
-    "discus": _discus,
-    "shot": _shot,
-    "frisbee": _frisbee,
-}
 
 
 def bowling(rng: random.Random, side: str = "") -> Gesture:
@@ -372,7 +125,7 @@ def bowling(rng: random.Random, side: str = "") -> Gesture:
     below = HandPlace((0.04, -0.5, 0.02), "shoulder", _BACK)
     behind = HandPlace((0.08, -0.26, -0.42), "shoulder", _BACK)
 
-    def sequel(feet: _Feet) -> Sequel:
+    def sequel(feet: StandingFeet) -> Sequel:
         def way(left: float, right: float, hand: HandPlace, low: float, lean: float, heel: str) -> Posture:
             at = {LEFT: left, RIGHT: right}
             put = {one: feet[one].tiptoe(30, at[one]) if one == heel else feet[one].flat(at[one]) for one in at}
@@ -409,7 +162,7 @@ def bowling(rng: random.Random, side: str = "") -> Gesture:
         done.then(0.2 * pace, low)
         done.then(0.16 * pace, rolled)
         done.then(0.26 * pace, through, 0.35)
-        return _ends(done, feet, ends)
+        return come_together(done, feet, ends)
 
     return on_feet(sequel, ["throw", "bowling"], rng.uniform(0.3, 0.6), side=side or RIGHT, mirror=side == LEFT)
 
@@ -433,7 +186,7 @@ def jump_shot(rng: random.Random, side: str = "", times: int | None = None) -> G
         LEFT: HandPlace((-0.02, 0.28, 0.22), "shoulder", _OUT),
     }
 
-    def sequel(feet: _Feet) -> Sequel:
+    def sequel(feet: StandingFeet) -> Sequel:
         toes = {one: foot.tiptoe(46) for one, foot in feet.items()}
         bent = Posture((0.0, 0.8, -0.03), (14, 0, 0), (10, 0, 0), (-26, 0, 0), hands=low)
         leaves = Posture((0.0, 0.98, 0.02), (0, 0, 0), (0, 0, 0), (-12, 0, 0), hands=over, feet=toes)
@@ -452,7 +205,7 @@ def jump_shot(rng: random.Random, side: str = "", times: int | None = None) -> G
             flat = {one: foot.flat() for one, foot in feet.items()}
             done.then(0.18, Posture((0.0, 0.84, 0.0), (8, 0, 0), (6, 0, 0), (-14, 0, 0), hands=shot, feet=flat))
             done.then(0.34, Posture((0.0, 0.92, 0.0), hands=both(_LOWERED), feet=flat))
-        return _ends(done, feet)
+        return come_together(done, feet)
 
     told = ["jump-shot"]
     return on_feet(sequel, told, rng.uniform(0.3, 0.6), side=side or RIGHT, mirror=side == LEFT, times=times)
@@ -482,7 +235,7 @@ def fencing_lunge(
     }
     rear: Point = (0.98, -0.05, 0.15)
 
-    def sequel(feet: _Feet) -> Sequel:
+    def sequel(feet: StandingFeet) -> Sequel:
         def feet_at(front: float, back: float, roll: float = 0.0) -> dict[str, FootPlace]:
             return {
                 RIGHT: FootPlace((0.05, 0.07, front), (0.05, -0.45, 0.9)),
@@ -520,16 +273,3 @@ def fencing_lunge(
 
     told = ["fencing-lunge"]
     return on_feet(sequel, told, rng.uniform(0.3, 0.6), side=side or RIGHT, mirror=side == LEFT, times=times)
-
-
-def _stride(feet: _Feet, far: float, heel: float = 0.0, rear: float = 0.0) -> dict[str, FootPlace]:
-    """Both feet, the left one `far` metres ahead, the heel of the right one lifted until the foot points down by
-    `heel` degrees."""
-    back = feet[RIGHT].tiptoe(heel, rear) if heel else feet[RIGHT].flat(rear)
-    return {LEFT: feet[LEFT].flat(far), RIGHT: back}
-
-
-def _ends(done: Sequel, feet: _Feet, at: float = 0.0) -> Sequel:
-    """Add the end of a movement: the feet come together, metres forward of where they stood, and the body stands."""
-    done.then(0.6, Posture((0.0, 0.94, at), feet={side: foot.flat(at) for side, foot in feet.items()}))
-    return done

@@ -6,7 +6,7 @@ import random
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from marey.drawing.flights import StandingFoot, on_feet
+from marey.drawing.flights import StandingFeet, on_feet
 from marey.drawing.gesture import SIDES, Gesture
 from marey.drawing.postures import FootPlace, HandPlace, Posture
 from marey.drawing.sequels import Sequel
@@ -51,7 +51,7 @@ class _Stagger:
     brief: bool = False
     struck: float = 0.0
 
-    def sequel(self, feet: dict[str, StandingFoot]) -> Sequel:
+    def sequel(self, feet: StandingFeet) -> Sequel:
         """The postures over the feet of an idle."""
         left, ahead = STAGGER_WAYS[self.way]
         at = {side: (SIGN[side] * feet[side].out, feet[side].forward) for side in SIDES}
@@ -111,9 +111,7 @@ class _Stagger:
             0.5 * seconds, replace(lean, pelvis=(reached[0], low, reached[1]), feet=landed), 0.25 if catches else 0.0
         )
 
-    def _stand(
-        self, done: Sequel, at: dict[str, tuple[float, float]], side: str, feet: dict[str, StandingFoot]
-    ) -> None:
+    def _stand(self, done: Sequel, at: dict[str, tuple[float, float]], side: str, feet: StandingFeet) -> None:
         """Bring the foot behind beside the other one, sway over both, and stand."""
         other = OTHER_SIDE[side]
         apart = SIGN[side] * (feet[LEFT].out + feet[RIGHT].out)

@@ -7,7 +7,7 @@ import math
 import random
 from dataclasses import dataclass, replace
 
-from marey.drawing.flights import StandingFoot, on_feet
+from marey.drawing.flights import StandingFeet, on_feet
 from marey.drawing.gesture import SIDES, Gesture
 from marey.drawing.leaps import running, running_step
 from marey.drawing.postures import STAND, FootPlace, HandPlace, Point, Posture
@@ -96,7 +96,7 @@ class _BallStrike:
     high: float
     starts: float
 
-    def sequel(self, feet: dict[str, StandingFoot]) -> Sequel:
+    def sequel(self, feet: StandingFeet) -> Sequel:
         """The postures over the feet of an idle."""
         done = Sequel([self.starts])
         at: dict[str, float] = dict.fromkeys(SIDES, 0.0)
@@ -109,7 +109,7 @@ class _BallStrike:
         self._goes_through(done, feet, plant)
         return done
 
-    def _strikes(self, done: Sequel, feet: dict[str, StandingFoot], behind: float, plant: float) -> None:
+    def _strikes(self, done: Sequel, feet: StandingFeet, behind: float, plant: float) -> None:
         """Step beside the ball with the leg drawn back, and whip it through the ball."""
         seconds = _STEPS[-1][1]
         wide = {
@@ -135,7 +135,7 @@ class _BallStrike:
         struck = Posture((-0.05, 0.87, plant - 0.02), (-4, 10, 16), (16, 0, 8), (8, 0, -8), hands=wide)
         done.then(0.09, replace(struck, feet={RIGHT: stood, LEFT: hit}))
 
-    def _goes_through(self, done: Sequel, feet: dict[str, StandingFoot], plant: float) -> None:
+    def _goes_through(self, done: Sequel, feet: StandingFeet, plant: float) -> None:
         """Follow through, come down on the foot that kicked, and stand."""
         far = math.sqrt(_LEG**2 - (self.high - 0.85) ** 2)
         swung = {

@@ -6,7 +6,7 @@ import random
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from marey.drawing.flights import StandingFoot, on_feet
+from marey.drawing.flights import StandingFeet, on_feet
 from marey.drawing.gesture import SIDES, Gesture
 from marey.drawing.postures import FootPlace, HandPlace, Posture
 from marey.drawing.sequels import Sequel
@@ -35,7 +35,7 @@ class _Stumble:
     starts: float
     recovers: float
 
-    def sequel(self, feet: dict[str, StandingFoot]) -> Sequel:
+    def sequel(self, feet: StandingFeet) -> Sequel:
         """The postures over the feet of an idle."""
         done = Sequel([self.starts])
         caught = {LEFT: feet[LEFT].tiptoe(30), RIGHT: feet[RIGHT].flat()}
@@ -52,7 +52,7 @@ class _Stumble:
     def _step(
         self,
         done: Sequel,
-        feet: dict[str, StandingFoot],
+        feet: StandingFeet,
         at: Mapping[str, float],
         side: str,
         step: tuple[float, float, float],
@@ -71,7 +71,7 @@ class _Stumble:
         done.then(0.5 * seconds, replace(lean, pelvis=(0.0, 0.84, there - 0.13), feet=landed, hands=swapped))
         return {other: at[other], side: there}
 
-    def _recover(self, done: Sequel, feet: dict[str, StandingFoot], at: Mapping[str, float], behind: str) -> None:
+    def _recover(self, done: Sequel, feet: StandingFeet, at: Mapping[str, float], behind: str) -> None:
         """Sink over the foot ahead, bring the other one up to it, and stand."""
         ahead = OTHER_SIDE[behind]
         end, hands = at[ahead], {LEFT: _LOW, RIGHT: _LOW}

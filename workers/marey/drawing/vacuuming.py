@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 
-from marey.drawing.flights import StandingFoot, on_feet
+from marey.drawing.flights import StandingFeet, on_feet
 from marey.drawing.gesture import Gesture
 from marey.drawing.postures import HandPlace, Posture
 from marey.drawing.sequels import Sequel
@@ -30,7 +30,7 @@ def vacuuming(rng: random.Random, side: str = "", *, seconds: float | None = Non
     number = max(round(((seconds or rng.uniform(6.0, 8.0)) - 1.7) / (STROKE_S * pace)), 1)
     outs = [rng.uniform(0.12, 0.3) for _ in range(number)]
 
-    def sequel(feet: dict[str, StandingFoot]) -> Sequel:
+    def sequel(feet: StandingFeet) -> Sequel:
         done, at = Sequel([0.25]), 0.0
 
         def rocked(share: float, out: float) -> Posture:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import random
 from dataclasses import dataclass, replace
 
-from marey.drawing.flights import StandingFoot, on_feet
+from marey.drawing.flights import StandingFeet, on_feet
 from marey.drawing.gesture import SIDES, Gesture
 from marey.drawing.leaps import running, running_step
 from marey.drawing.postures import FootPlace, HandPlace, Point, Posture
@@ -36,7 +36,7 @@ class _Vault:
     starts: float
     pace: float
 
-    def sequel(self, feet: dict[str, StandingFoot]) -> Sequel:
+    def sequel(self, feet: StandingFeet) -> Sequel:
         """The postures over the feet of an idle."""
         done = Sequel([self.starts])
         at: dict[str, float] = dict.fromkeys(SIDES, 0.0)
@@ -56,7 +56,7 @@ class _Vault:
         free = HandPlace((0.36, 0.02, 0.22), "shoulder", (0.5, -0.7, -0.5))
         return {side: top if side in sides else free for side in SIDES}
 
-    def _up(self, done: Sequel, feet: dict[str, StandingFoot], wall: float) -> None:
+    def _up(self, done: Sequel, feet: StandingFeet, wall: float) -> None:
         """Plant both hands over the left foot, and push off it."""
         stood, hands = wall - _BEFORE_M, self._hands(wall, *SIDES)
         swings = FootPlace((0.16, 0.34, stood - 0.2), (0.2, -0.8, 0.1))
@@ -101,7 +101,7 @@ class _Vault:
         held = self._hands(wall, *hands)
         done.then(seconds * self.pace, Posture(at, *trunk, 0.0, held, feet, dict.fromkeys(SIDES, _LIFTED)))
 
-    def _lands(self, done: Sequel, feet: dict[str, StandingFoot], there: float) -> None:
+    def _lands(self, done: Sequel, feet: StandingFeet, there: float) -> None:
         """Land on the right foot, then on the left one, sink, and step on until both stand."""
         far, hands = there + 0.42, self._hands(there)
         places = {RIGHT: feet[RIGHT].tiptoe(18, there), LEFT: FootPlace((0.1, 0.34, there + 0.14), (0.1, -0.5, 0.85))}

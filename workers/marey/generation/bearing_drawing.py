@@ -75,9 +75,10 @@ def borne(motion: MotionFeatures, layout: FeatureLayout, spans: Sequence[BorneSp
                 side = str(rng.choice(list(LEGS)))
             joints = draw(joints, layout, span.begin, span.end, side, rng)
     body = StandingBody(joints)
-    shares, all_drawn = trunk_shares(span.stated for span in spans), amounts_of_bearings(spans, len(features), layout.fps)
+    shares = trunk_shares(span.stated for span in spans)
     drawings = [
-        _Drawing(body, each, ways, layout.fps, rng, shares.get(each.name, 1.0)) for each, ways, rng in all_drawn
+        _Drawing(body, each, amounts, layout.fps, rng, shares.get(each.name, 1.0))
+        for each, amounts, rng in amounts_of_bearings(spans, len(features), layout.fps)
     ]
     for drawing in drawings:
         drawing.draw_body()

@@ -17,6 +17,7 @@ from marey.drawing.burpees import burpees
 from marey.drawing.dives import cover_dive, ground_slide, side_dive
 from marey.drawing.doors import pulled_door, pushed_door
 from marey.drawing.errands import cower, curtsy, rowing, shelf_lift, shoe_tied
+from marey.drawing.field_throws import field_throw
 from marey.drawing.floor_ways import ground_pounded
 from marey.drawing.gesture import SIDES, Gesture
 from marey.drawing.knee_raises import knee_raise
@@ -28,7 +29,7 @@ from marey.drawing.pitches import pitch
 from marey.drawing.planks import plank
 from marey.drawing.sidesteps import sidestep
 from marey.drawing.slips import slip_caught
-from marey.drawing.sports import bowling, fencing_lunge, field_throw, jump_shot, tennis_serve
+from marey.drawing.sports import bowling, fencing_lunge, jump_shot, tennis_serve
 from marey.drawing.staggers import stagger
 from marey.drawing.stumbles import stumble
 from marey.drawing.vacuuming import vacuuming
