@@ -26,10 +26,12 @@ class OnceMade:
         self.features = LAYOUT.encode(joints)
 
 
-def drawn(joints: np.ndarray, *stated: StatedBearing, begin: int = 0, end: int | None = None) -> np.ndarray:
+def drawn(
+    joints: np.ndarray, *stated: StatedBearing, begin: int = 0, end: int | None = None, action: str = "walk"
+) -> np.ndarray:
     """Return the joints of a motion with bearings from `begin` on; the toes are where they were in frame 0."""
     made: MotionFeatures = OnceMade(joints)
-    spans = [BorneSpan(begin, len(made.features) if end is None else end, stated, action="walk", seed=3)]
+    spans = [BorneSpan(begin, len(made.features) if end is None else end, stated, action, seed=3)]
     joints = LAYOUT.decode(borne(made, LAYOUT, spans)).astype(np.float64)
     return joints - joints[:1, TOES].mean(1, keepdims=True) * [1, 0, 1]
 

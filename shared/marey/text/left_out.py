@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from marey.text.action_reader import OUTSIDE, named_actions
 from marey.text.clause_order import CONTEXT, PLAIN, ReadClause, is_end, without_joints
 from marey.text.clause_parts import goes_on
+from marey.text.one_shot import is_part_of_shot
 from marey.text.readings import ReadPrompt
 from marey.text.roles import Argument, Frame
 from marey.text.sequence_reader import STOPS, ReadMovement
@@ -82,6 +83,8 @@ def parts_left_out(
             continue
         row = _row_of(clause, rows)
         if row is not None and puts_load(row.text, _before(row, rows)):
+            continue
+        if row is not None and is_part_of_shot(clause.text, row.action):
             continue
         if row is not None and row.action not in (None, STANDING):
             before = zip(clauses[:number], said, strict=False)

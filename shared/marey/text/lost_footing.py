@@ -12,7 +12,11 @@ _OBSTACLE = r"""(?:(?!balance\b|side\b|other\b)[a-z-]+)"""
 _SO = (
     r"(?:,?\ and\ then|,?\ and|,?\ then|,)\ (?:(?:he|she|they)\ )?(?:(?:then|suddenly|promptly|almost\ immediately)\ )?"
 )
-_CAUGHT = r"""(?!(?:,?\ (?:and\ then|and|but|then|before|without)|,)(?:\ (?:he|she|they))?
+_FLAILING = (
+    r"(?:,?\ (?:(?:with\ )?(?:(?:his|her|their)\ )?arms?\ [a-z]+(?:\ \w+ly)?|flailing|wobbling|teetering|swaying))?"
+)
+_CAUGHT = rf"""(?!\ (?:peels?|skins?)\b)
+    (?!{_FLAILING}(?:,?\ (?:and\ then|and|but|then|before|without)|,)(?:\ (?:he|she|they))?
     (?:\ \w+ly|\ just|\ soon|\ manages\ to)*\ (?:catch|regain|recover|keep|find|stead|sav|right|stay|almost|nearly
     |does\ not|doesn't|don't|grab|hold))"""
 _FALLS = rf"""(?:{_SO}(?:falls?|falling|fell|lands?|landed|landing|goes\ down|went\ down|crash(?:es|ed|ing)

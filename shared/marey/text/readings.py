@@ -23,6 +23,7 @@ from marey.text.elided_words import parts_by_sides
 from marey.text.encoders import Encoding
 from marey.text.held_hand import with_held_hand
 from marey.text.misleading_words import EXERCISE, has_other_sense, lunges_as_exercise, without_misleading
+from marey.text.one_shot import with_whole_shots
 from marey.text.order_reader import is_asked_for_order, marked, order_reader
 from marey.text.plain_action import with_plain_action
 from marey.text.reader_file import Float32
@@ -173,7 +174,10 @@ class TrainedReaders:
             )
             or (each,)
         )
-        return replace(reading, movements=tuple(with_held_hand(from_there(movements))))
+        whole = with_whole_shots(movements)
+        if len(whole) == 1 < len(movements) and not reading.drawn:
+            return ReadPrompt.of(bare.prompt, whole[0].action)
+        return replace(reading, movements=tuple(with_held_hand(from_there(whole))))
 
     def _known(self, movement: ReadMovement) -> tuple[ReadMovement, ...]:
         """Return a movement whose action is in doubt with the one that is read in its words alone; else none."""
@@ -344,14 +348,14 @@ class TrainedReaders:
         for part in parts:
             if found and comes_with(found[-1].text, part):
                 how, part = before_next_verb(part)
-                found[-1] = replace(found[-1], text=f"{found[-1].text} {how}")
+                found[-1] = replace(found[-1], text=f"{found[-1].text} {how}", seconds=None)
             if not part:
                 continue
             bare = BarePrompt.of(part)
             stays = found and found[-1].action in STAYING and stated_length(found[-1].text).seconds is None
             looked = found and len(stated_gaze(found[-1].text)) > 1 and not stated_gaze(part)
             if stays and not (looked or _in_turn(found[-1], bare)) and not without_gaze(bare.text):
-                found[-1] = replace(found[-1], text=f"{found[-1].text} and {part}")
+                found[-1] = replace(found[-1], text=f"{found[-1].text} and {part}", seconds=None)
                 continue
             if not without_gaze(bare.text):
                 found.append(ReadMovement(part, STANDING))

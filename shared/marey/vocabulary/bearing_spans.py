@@ -36,9 +36,11 @@ _LIKE = re.compile(
 )
 _DENIED = re.compile(
     r"\b(?:(?:without|not|never|no|n't|don't|doesn't)\s+(?:(?!and\b|then\b)\w+\s+){0,2}"
-    r"|(?:stops?|avoids?|instead of)\s+"
+    r"|(?:avoids?|instead of)\s+"
     r"|(?:until|when|if|because|before|after)\s+(?:(?:he|she|they|it|the \w+)\s+)?(?:(?:is|are)\s+)?)$"
 )
+_STOPPED = re.compile(r"\bstops?\s+$")
+"""Words behind which others say what comes to an end: "stops waving", but not "stops with his hands on his knees"."""
 BEHIND_AND = re.compile(r"\b(?:and|then)\b\W*(?:(?:he|she|they|it)\s+)?$", re.IGNORECASE)
 _SUBJECT = re.compile(rf"\b(?:(?:{ALL}) (?:(?!(?:{ALL}) )[\w,-]+ ){{0,4}}|who )$")
 _ARTICLE = re.compile(r"\b(?:a|an|the|his|her|their|its) (\w+ )?$")
@@ -163,9 +165,15 @@ def bearing_spans(prompt: str) -> tuple[BearingSpan, ...]:
         return ()
     for each in sorted(_matches(text), key=lambda words: (words.start, -words.end, not words.instead)):
         apart = not spans or each.start >= spans[-1].end
-        if (apart or _is_of_who(each, spans[-1])) and not _DENIED.search(text[: each.start]):
+        if (apart or _is_of_who(each, spans[-1])) and not _is_denied(text, each.start):
             spans.append(each)
     return tuple(_of_limps(text, _of_zombies(spans)))
+
+
+def _is_denied(text: str, start: int) -> bool:
+    """Return True if what begins there in a text is not done: "without waving", "stops waving"."""
+    before = text[:start]
+    return bool(_DENIED.search(before) or (_STOPPED.search(before) and not text.startswith("with ", start)))
 
 
 def _of_limps(text: str, spans: Iterable[BearingSpan]) -> Iterator[BearingSpan]:

@@ -69,6 +69,8 @@ MOVES_ON_FEET = ARMS_BUSY | frozenset(
     | {"throw", "twist", "wash", "climb-stairs"}
 )
 """Actions of a body on its feet in whose trunk and head a mood shows."""
+LOW = ("knee", "foot")
+"""Places of hands to which a body comes down where it stands, not on its way."""
 Shown = Literal["body", "upper", "trunk", ""]
 """Parts of a bearing that are drawn beside an action: all, all but the legs, trunk and head alone, or none."""
 _BRINGS = re.compile(
@@ -281,6 +283,8 @@ class StatedBearing:
         bearing = self.bearing
         if bearing.moves:
             return "body" if action == "idle" else ""
+        if any(pose.at in LOW for pose in bearing.arms.values()):
+            return "body" if action == "idle" or action in bearing.also else ""
         if action in UPRIGHT or action in bearing.also:
             return "body"
         leans = bearing.trunk or bearing.head

@@ -271,7 +271,7 @@ def test_a_sword_is_drawn_from_the_other_hip_and_brought_back_to_it() -> None:
     ],
 )
 def test_a_hand_comes_to_the_part_that_hurts(name: str, side: str, wrist: int, joint: int, near: float) -> None:
-    joints = drawn(standing(5.0), named(name, side))
+    joints = drawn(standing(5.0), named(name, side), action="idle")
     away = np.linalg.norm(joints[:, wrist] - joints[:, joint], axis=1)
     assert away.min() < near < away[0]
     assert (away < near + 0.05).sum() > 1.5 * FPS
@@ -298,7 +298,7 @@ def test_a_hand_stays_at_the_part_that_hurts_on_the_way(
 
 
 def test_hands_that_tie_a_shoe_are_at_one_foot() -> None:
-    joints = drawn(standing(5.0), named("lace-tying"))
+    joints = drawn(standing(5.0), named("lace-tying"), action="idle")
     apart = np.linalg.norm(joints[:, 20] - joints[:, 21], axis=1)
     assert apart[len(joints) // 2 :].max() < 0.25
     assert joints[len(joints) // 2 :, WRISTS, 1].max() < 0.72  # of a body that stands

@@ -52,6 +52,18 @@ def test_hands_at_the_head_stay_before_it() -> None:
                 assert np.linalg.norm(swung, axis=1).min() > 0.08, bearing.id
 
 
+def test_who_is_winded_stoops_with_the_hands_on_the_knees_and_breathes() -> None:
+    joints = drawn("puts his hands on his knees, panting", seconds=7.0)
+    held = joints[60:80]
+    for wrist, knee in ((20, 4), (21, 5)):
+        assert np.linalg.norm(held[:, wrist] - held[:, knee], axis=-1).max() < 0.25
+    assert held[:, HEAD, 1].max() < joints[0, HEAD, 1] - 0.12
+    assert turns(joints[50:100, HEAD, 1], 0.005) >= 2
+    (winded,) = stated_bearings("puts his hands on his knees, panting")
+    assert winded.shown_in("idle") == "body"
+    assert not winded.shown_in("walk")
+
+
 def test_a_kiss_leaves_the_mouth_ahead() -> None:
     joints = drawn("blows a kiss to the crowd")
     hand = joints[:, WRISTS["right"]] - joints[:, HEAD]

@@ -18,8 +18,9 @@ from marey.generation.candidates import DrawPlan, best_clips, draw_clips
 from marey.generation.export import finish
 from marey.generation.port import Limits, Request
 from marey.generation.shots.dispatch import generate_any, resolve_request, timeline_request
+from marey.generation.shots.going_on import is_onward
 from marey.generation.shots.timeline_plan import even_parts, gaps_of, plan_timeline
-from marey.generation.shots.timelines import generate_timelines, is_onward, row_requests
+from marey.generation.shots.timelines import generate_timelines, row_requests
 from marey.items.timeline import read_timeline, timeline_rows
 from marey.items.values import MAX_SEED
 from marey.registry import get_model, model_names, resolve

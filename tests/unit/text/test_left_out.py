@@ -35,6 +35,7 @@ def test_clauses_that_no_movement_shows_are_left_out(reading: TextPipeline, prom
     "prompt",
     [
         "walks to the door, stops, then looks back over his left shoulder",
+        "the ranger draws his bow, aims low and releases",
         "stretches her arms overhead, yawns, then does five jumping jacks",
         "Lifts a heavy crate, staggers backwards under its weight and drops it",
         "He jumps over the fence as the dog barks",

@@ -36,6 +36,8 @@ def test_feet_that_slip_or_trip_end_in_a_fall(prompt: str) -> None:
         "nearly slips on the ice",
         "slips on the ice but regains his balance",
         "trips over a root and then catches herself",
+        "slips on a banana peel and catches himself",
+        "slips on the wet deck, arms flailing, recovers his balance",
         "goes on a trip",
         "loses his temper",
     ],

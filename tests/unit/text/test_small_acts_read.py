@@ -33,6 +33,8 @@ def acts(prompt: str) -> list[tuple[str, str]]:
         ("points to the left, then to the right, then at himself", [[], [], ["points-self"]]),
         ("folds his arms, taps his foot and sighs", [["arms-crossed"], ["foot-tap"], ["sigh"]]),
         ("a boy walks in, sighs and leans on his staff", [[], ["sigh"], ["stick-lean"]]),
+        ("a courier runs up, stops, and catches her breath", [[], ["winded"]]),
+        ("a miner swings his pickaxe overhead, then waves", [["chopping"], []]),
     ],
 )
 def test_gestures_of_a_list_have_their_turns(reading: TextPipeline, prompt: str, movements: list[list[str]]) -> None:
@@ -51,6 +53,12 @@ def test_gestures_of_a_list_have_their_turns(reading: TextPipeline, prompt: str,
         ("drops the glass in shock", "idle", ["thing-dropped"]),
         ("argues, jabbing a finger", "talk", ["finger-jabbed"]),
         ("shakes hands with a guest", "reach-forward", ["handshake"]),
+        ("a jogger doubles over, gasping for air", "idle", ["winded"]),
+        ("hands on his thighs, panting hard", "idle", ["winded"]),
+        ("an out of breath messenger stops and leans forward with his hands on his knees", "idle", ["winded"]),
+        ("walks, panting heavily", "walk", ["tired"]),
+        ("a lumberjack swings a heavy axe over his head", "idle", ["chopping"]),
+        ("slips on the ice, arms windmilling, regains her balance", "idle", ["stumble"]),
     ],
 )
 def test_small_acts_are_read_as_what_the_body_does(
@@ -99,3 +107,9 @@ def test_the_hand_that_took_a_thing_goes_on_with_it(prompt: str, again: str) -> 
 )
 def test_words_of_small_acts(prompt: str, found: list[tuple[str, str]]) -> None:
     assert acts(prompt) == found
+
+
+def test_who_stops_with_hands_on_the_knees_does_not_stop_holding_them_there(reading: TextPipeline) -> None:
+    (features,) = reading.features(["he jogs to the wall and stops with his hands on his knees"])
+    assert [[each.name for each in stated_bearings(one.said)] for one in features.movements] == [[], ["winded"]]
+    assert acts("she stops rubbing her arms") == []

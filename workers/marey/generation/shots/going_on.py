@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from marey.generation.footing import RUNS
 from marey.generation.onward import gone_on_with_strides
 from marey.generation.skidding import skids
 from marey.generation.wish import action_of
@@ -25,6 +26,8 @@ Float32 = NDArray[np.float32]
 
 GOES_ON = WAYS | {"leap"}
 """Actions of a body that may go on from them into the next one: who leaps runs up and on."""
+FALLING, THROWING = frozenset({"die", "roll"}), frozenset({"throw"})
+"""Actions that go on out of the speed of a way, and of a run."""
 GOING = 0.7
 """Share of its median speed under which a way begins or ends."""
 MOST_S, LEAST_S = 1.5, 1.0
@@ -39,6 +42,12 @@ def is_way(text: TextFeatures) -> bool:
         return False
     steps = wanted_of(text.actions or (text.rewritten,)) or ()
     return len(steps) == 1 and {each.action for each in steps[0]} <= GOES_ON
+
+
+def is_onward(before: TextFeatures, after: TextFeatures) -> bool:
+    """Return True if a drawn movement goes out of the speed of the way before it."""
+    action = action_of(after)
+    return is_way(before) and (action in FALLING or (action in THROWING and action_of(before) in RUNS))
 
 
 def without_halt(before: Float32, after: Float32, layout: FeatureLayout) -> tuple[Float32, Float32]:

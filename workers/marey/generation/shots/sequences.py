@@ -21,7 +21,7 @@ from marey.generation.posture import NO_POSTURE
 from marey.generation.postured import gestures_s
 from marey.generation.row_postures import Row, rises, row_postures
 from marey.generation.shots.one_movement import joined_movements
-from marey.generation.shots.way_lengths import with_room_back
+from marey.generation.shots.way_lengths import with_least_ways, with_room_back
 from marey.generation.timed import TimedText, part_seed
 from marey.generation.wish import action_of
 from marey.items.timeline import MIN_ROW_SECONDS
@@ -102,6 +102,7 @@ def as_timeline(generator: Generator[Any], request: Request) -> Request:
         own or _drawn_frames(generator, request, movement, number)
         for number, (own, movement) in enumerate(zip(stated, movements, strict=True))
     ]
+    lengths = with_least_ways(movements, lengths, generator.limits, stated)
     if request.frames is None:
         roomy = with_room_back(request.text.said, movements, lengths, generator.limits, stated)
         lengths = [own or room for own, room in zip(stated, roomy, strict=True)]

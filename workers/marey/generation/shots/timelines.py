@@ -30,6 +30,7 @@ from marey.generation.shots.freezing import AS_BEFORE, freezes, frozen
 from marey.generation.shots.going_on import (
     as_long_as_stated,
     aside_of,
+    is_onward,
     is_way,
     keeps_course,
     without_halt,
@@ -63,7 +64,6 @@ BENT, LOWER = frozenset({"bend-over"}), frozenset({KNEES, KNEE, FLOOR, BACK, FRO
 
 STRUCK = frozenset({"flinch"})
 """Actions of who is hit: that bends a body, which then bends on."""
-FALLING, THROWING = frozenset({"die", "roll"}), frozenset({"throw"})
 """Drawn movements that go out of a walk or run, and out of a run alone."""
 
 
@@ -436,9 +436,3 @@ def _is_raised(text: TextFeatures) -> bool:
     vocabulary = load_vocabulary()
     action = vocabulary.said_first(text.rewritten)
     return action is not None and vocabulary.need(action).support == "raised"
-
-
-def is_onward(before: TextFeatures, after: TextFeatures) -> bool:
-    """Return True if a drawn movement goes out of the speed of the way before it."""
-    action = action_of(after)
-    return is_way(before) and (action in FALLING or (action in THROWING and action_of(before) in RUNS))

@@ -15,18 +15,22 @@ from numpy.typing import NDArray
 
 from marey.generation.distances import as_far, distance_of, frames_of_distance, passed_on
 from marey.generation.port import Limits
-from marey.generation.shots.going_on import is_way
+from marey.generation.shots.going_on import is_onward, is_way
 from marey.generation.shots.raised_arms import TURNING
 from marey.generation.wish import action_of
 from marey.motion.courses import course_of
 from marey.motion.features import FeatureLayout
 from marey.text.features import TextFeatures
+from marey.vocabulary.counts import stated_count
 from marey.vocabulary.distances import stated_distance
 
 Float32 = NDArray[np.float32]
 
 STARTS_S = 2.0
 """Seconds more of a way back than of one whose seconds are stated: it starts from rest, and is cut to its length."""
+LEAST_S, GOES_ON_S = 3.5, 1.5
+"""Seconds of a way of a sequence at least, and those that it loses to a fall, roll or throw out of its speed."""
+_SHORT = re.compile(r"\b(?:steps?|paces|strides?|few|couple|bit|little|short|brief\w*|moment|inch\w*)\b", re.IGNORECASE)
 AROUND = 150.0
 """Degrees of a turn from which on a way leads back."""
 _BACK = re.compile(
@@ -87,6 +91,31 @@ def metres_between(features: Float32, layout: FeatureLayout, begin: int, end: in
     """Return the metres that a body goes between two frames of features (T, D)."""
     course = course_of(features, layout)
     return float(passed_on(course.at(np.arange(float(begin), end)), layout.fps)[-1])
+
+
+def with_least_ways(
+    movements: Sequence[TextFeatures], lengths: Sequence[int], limits: Limits, stated: Sequence[int | None]
+) -> list[int]:
+    """Return the frames of movements, of which ways are seen: they take some seconds, unless their words say how long
+    they are, in seconds, metres or steps, or that they are short.
+
+    Args:
+        movements: in their order.
+        lengths: frames of each.
+        limits: of the model.
+        stated: frames that the words state; None = they do not.
+    """
+    found = list(lengths)
+    for number, each in enumerate(movements):
+        action = action_of(each)
+        if stated[number] is not None or not is_way(each) or _SHORT.search(each.said):
+            continue
+        if stated_distance(each.said, action) is not None or stated_count(each.said, action) is not None:
+            continue
+        onward = number + 1 < len(movements) and is_onward(each, movements[number + 1])
+        least = LEAST_S + GOES_ON_S * onward
+        found[number] = max(found[number], limits.within(round(least * limits.fps)))
+    return found
 
 
 def with_room_back(
