@@ -50,7 +50,7 @@ _STROKES = re.compile(
 _CLAUSE = re.compile(
     r"(?: (?!and\b|then\b|while\b|before\b|after\b|as\b)[\w'×-]+){0,4}"
     r"(?:,? (?:with |using )?(?:both|alternating|each) (?:arms?|hands?|sides?))?"
-    r"(?:,? (?:for |exactly |just )?[\w×]+ ?[\w×]+\b)?"
+    rf"(?:,? (?:for |exactly |just )?(?:once|twice|thrice|[×x] ?\d+|\d+|{'|'.join(_NUMBERS)})(?: ?[\w×]+)?\b)?"
 )
 """Words behind what is done that may name a number of strokes: those of its clause, and a number behind a comma."""
 _GIVEN = re.compile(

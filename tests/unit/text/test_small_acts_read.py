@@ -35,6 +35,8 @@ def acts(prompt: str) -> list[tuple[str, str]]:
         ("a boy walks in, sighs and leans on his staff", [[], ["sigh"], ["stick-lean"]]),
         ("a courier runs up, stops, and catches her breath", [[], ["winded"]]),
         ("a miner swings his pickaxe overhead, then waves", [["chopping"], []]),
+        ("draws her blade, slashes twice at the rope and sheathes it", [["sword-drawn"], [], ["sword-sheathed"]]),
+        ("the batter drops his bat and jogs off", [["thing-dropped"], []]),
     ],
 )
 def test_gestures_of_a_list_have_their_turns(reading: TextPipeline, prompt: str, movements: list[list[str]]) -> None:
@@ -51,6 +53,8 @@ def test_gestures_of_a_list_have_their_turns(reading: TextPipeline, prompt: str,
         ("beckons with the left hand for 4 seconds", "idle", ["beckon"]),
         ("lays the baby down gently", "idle", ["thing-laid-down"]),
         ("drops the glass in shock", "idle", ["thing-dropped"]),
+        ("lays down her shield", "idle", ["thing-laid-down"]),
+        ("leans on his spade to catch his breath", "idle", ["stick-lean"]),
         ("argues, jabbing a finger", "talk", ["finger-jabbed"]),
         ("shakes hands with a guest", "reach-forward", ["handshake"]),
         ("a jogger doubles over, gasping for air", "idle", ["winded"]),
