@@ -32,30 +32,30 @@ _AT = (
 """Objects that a head faces which turns up or down: "up at the tower"."""
 _BEHIND = r"behind(?: (?:him|her|them)(?:sel(?:f|ves))?)?(?! (?:the|an?|my|your|his|their)\b)"
 _WHERE = {
-    "behind_left": rf"over (?:his|her|their|the|your|my) left shoulder"
-    rf"|(?:left )?{_BEHIND} (?:over|on|to) (?:his|her|their|the) left(?: shoulder| side)?",
-    "behind_right": rf"over (?:his|her|their|the|your|my) right shoulder"
-    rf"|(?:right )?{_BEHIND} (?:over|on|to) (?:his|her|their|the) right(?: shoulder| side)?",
+    "behind_left": rf"over (?:his|her|their|its|the|your|my) left shoulder"
+    rf"|(?:left )?{_BEHIND} (?:over|on|to) (?:his|her|their|its|the) left(?: shoulder| side)?",
+    "behind_right": rf"over (?:his|her|their|its|the|your|my) right shoulder"
+    rf"|(?:right )?{_BEHIND} (?:over|on|to) (?:his|her|their|its|the) right(?: shoulder| side)?",
     "left": r"left|leftwards?|(?:(?:in|at|into) )?(?:the|his|her) left mirror",
     "right": r"(?:(?:in|at|into) )?(?:the|his|her) (?:right|rear-?view|rear view|driving) mirror"
     r"|right(?! (?:at|into|in|through|past)\b)|rightwards?",
     "up": rf"up(?! (?:the|to) ){_AT}|upwards?|(?:at|to|into|towards?) (?:the )?(?:(?:night|blue|dark|starry) )?"
     r"(?:sky|ceiling|stars|heavens|clouds|moon|sun)",
-    "down": rf"down(?! the ){_AT}|downwards?|at (?:(?:the|his|her|their) )?(?:floor|ground|feet|shoes|watch)",
+    "down": rf"down(?! the ){_AT}|downwards?|at (?:(?:the|his|her|their|its) )?(?:floor|ground|feet|shoes|watch)",
     "around": r"around|about(?! to\b)|both ways|(?:from )?side to side|left and right|right and left",
-    "behind": rf"{_BEHIND}|over (?:his|her|their|the|one|a|your|my) shoulder",
+    "behind": rf"{_BEHIND}|over (?:his|her|their|its|the|one|a|your|my) shoulder",
 }
-_SIDE = r"(?:(?:back |quickly |slowly |briefly )?(?:to (?:the|his|her|their) )?)"
+_SIDE = r"(?:(?:back |quickly |slowly |briefly )?(?:to (?:the|his|her|their|its) )?)"
 _ANY = "|".join(f"(?P<{name}>{words})" for name, words in _WHERE.items())
 _LOOKS = re.compile(
     r"\b(?:look|glanc|gaz|peer|star|scan|check)(?:s|e|es|ing|ed)?\b"
-    r"|\b(?:turn|tilt|mov)(?:s|e|es|ing)? (?:(?:his|her|their|the) )?head\b(?: (?:to|and) (?:look|glance|peer)s?\b)?"
+    r"|\b(?:turn|tilt|mov)(?:s|e|es|ing)? (?:(?:his|her|their|its|the) )?head\b(?: (?:to|and) (?:look|glance|peer)s?\b)?"
 )
 _STEP = re.compile(rf"(?:\s*,?\s*(?:and |then |and then )?(?:{_SIDE}))(?:{_ANY})\b(?!-)")
-_SHAKES = re.compile(r"\bshak(?:e|es|ing) (?:(?:his|her|their|the) )?head\b(?: no\b)?|\bhead[ -]shak(?:e|ing)\b")
+_SHAKES = re.compile(r"\bshak(?:e|es|ing) (?:(?:his|her|their|its|the) )?head\b(?: no\b)?|\bhead[ -]shak(?:e|ing)\b")
 _TWICE = re.compile(
     r"\b(?:(?:does|do|did|doing|makes?|making)\ (?:an?|the|his|her)\ (?:\w+\ )?)?double[- ]takes?\b"
-    r"(?:\ to\ (?:the|his|her|their)\ (?P<side>left|right))?(?:\ at\ (?:the|a|an|his|her)\ (?:\w+\ )?\w+)?"
+    r"(?:\ to\ (?:the|his|her|their|its)\ (?P<side>left|right))?(?:\ at\ (?:the|a|an|his|her)\ (?:\w+\ )?\w+)?"
     r"|\blook(?:s|ing)?\ (?:away\ and\ )?(?:back\ )?twice\b"
 )
 """A second look at once."""
