@@ -6,9 +6,11 @@ import re
 from collections.abc import Mapping
 
 from marey.text.action_reader import named_actions
+from marey.text.blows_met import with_blows_met
 from marey.text.dropped_seats import with_seats_taken
 from marey.text.lost_footing import with_falls
 from marey.text.punched_air import with_pumped_fists
+from marey.text.turned_ways import with_turns_told
 from marey.vocabulary.bearing_words import stated_bearings
 from marey.vocabulary.scope import STANDING
 
@@ -85,12 +87,12 @@ _STRUCK = re.compile(
 """A blow that the person takes: "is pushed from behind"."""
 _SHOT = re.compile(r"(?:^|(?<=[,;:-] ))shot(?= (?:in|from|through) (?:behind|the|his|her|its|their)\b)", re.IGNORECASE)
 """The same without a verb: "shot in the chest, staggers back"."""
-_HIT_LEG = re.compile(
-    r"\b(?P<hit>gets?|getting)(?P<how> (?:\w+ly )?hit) in (?:the|his|her|their|its) (?:left |right )?"
-    r"(?:leg|thigh|knee|shin|foot|ankle|calf)\b",
+_HIT_LIMB = re.compile(
+    r"\b(?P<hit>gets?|getting|is|are|being)(?P<how> (?:\w+ly )?hit) (?:in|on|to) (?:the|his|her|their|its) "
+    r"(?:left |right |upper |lower )?(?:leg|thigh|knee|shin|foot|ankle|calf|arm|forearm|elbow|wrist|hand)\b",
     re.IGNORECASE,
 )
-"""A blow to a leg, of which models read a kick."""
+"""A blow to a limb, of which models read a kick, or an arm that blocks."""
 _SHOT_DEAD = re.compile(r"\b(?P<is>is|are|gets?|got|being) shot (?:dead|down)\b", re.IGNORECASE)
 """A blow that kills."""
 _STRUCK_DOWN = re.compile(
@@ -344,9 +346,11 @@ def without_misleading(prompt: str) -> str:
     A guard that does something else than to guard is a person. Who lies and rolls over lies, whose weight shifts from
     leg to leg stands, who falls over the knees falls once, and who falls to the knees kneels. A leg is laid over the
     other as the body sits.
+    Who meets a blow gets hit or dodges (`with_blows_met`), and turns are told as such (`with_turns_told`).
     Who goes up the stairs and "back down" turns around at their end, and who hauls himself up a rope climbs it. A
     dancer who leaps does so from one foot to the other.
     """
+    prompt = with_turns_told(with_blows_met(prompt))
     prompt = _DOWN_AGAIN.sub(_down_again, _UP_AND_DOWN.sub(_up_and_down, prompt))
     prompt = _DANCER_LEAPS.sub(_performs_a_leap, with_falls(with_seats_taken(prompt)))
     prompt = _DOER.sub(_as_person, _AT_WHEEL.sub(r"\g<drives>", prompt))
@@ -367,7 +371,7 @@ def without_misleading(prompt: str) -> str:
     text = _ROLLS_FROM_THERE.sub(_rolls_onto, text)
     text = _ROLLS_OVER.sub(_lies, text)
     text = _SHIFTS.sub(r"\g<shifts>", _HURDLE.sub(_jumps_over, _KNEE.sub(_knee_strike, text)))
-    return _HIT_LEG.sub(r"\g<hit>\g<how>", _STUMBLES_BACK.sub(r"\g<verb>\g<how> backward", text))
+    return _HIT_LIMB.sub(r"\g<hit>\g<how>", _STUMBLES_BACK.sub(r"\g<verb>\g<how> backward", text))
 
 
 def _as_person(found: re.Match[str]) -> str:

@@ -11,6 +11,8 @@ from marey.generation.fine import drawn_features
 from marey.generation.fine_wish import FineWish
 from marey.motion.features import HUMANML3D_263
 from marey.motion.skeleton import HUMANML3D
+from marey.referee import Body as Measured
+from marey.referee import shows
 from marey.selector.motion import Motion
 from marey.selector.repetitions import REPETITIONS
 from marey.selector.rules import RULES
@@ -79,6 +81,16 @@ def test_a_hook_swings_across_and_an_uppercut_comes_from_below() -> None:
     uppercut = hands(drawn("punch", "a right uppercut", side="right"))[:, 1]
     assert uppercut[:, 1].min() < -0.2
     assert uppercut[:, 1].max() > 0.05
+
+
+@pytest.mark.parametrize(
+    "prompt", ["{} uppercut", "uppercut, {}, heavy", "quick {} uppercut", "{} hook", "{} hand jab"]
+)
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_the_referee_passes_blows_of_either_hand(prompt: str, side: str) -> None:
+    blows = [drawn("punch", prompt.format(side), side=side, seed=seed) for seed in range(4)]
+    assert all(shows("punch", Measured(each, FPS).on_own_floor()) for each in blows)
+    assert all(shows("punch", Measured(LAYOUT.mirror_joints(each), FPS).on_own_floor()) for each in blows)
 
 
 def test_the_feet_of_a_body_that_punches_on_and_on_stay() -> None:

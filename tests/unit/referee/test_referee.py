@@ -242,14 +242,25 @@ def test_ahead_is_where_the_chest_faces() -> None:
     assert shows("aim", body(aiming))
 
 
-def _striking(begin: Joints, end: Joints) -> Joints:
+def _striking(begin: Joints, end: Joints, side: str = "R") -> Joints:
     """Hold a hand at `begin`, bring it to `end` within 0.15 s and hold it there."""
-    return arm_to(standing(2.0), "R", _between(np.tile(begin, (60, 1)), end, np.clip((seconds(2.0) - 1) / 0.15, 0, 1)))
+    way = _between(np.tile(begin, (60, 1)), end, np.clip((seconds(2.0) - 1) / 0.15, 0, 1))
+    return arm_to(standing(2.0), side, way)
 
 
 def test_a_punch_is_driven_out_by_the_elbow() -> None:
     assert shows("punch", body(_striking(np.array([-0.02, -0.1, 0.12]), np.array([0.0, 0.0, 0.5]))))
     assert not shows("punch", body(_striking(np.array([-0.1, -0.48, 0.0]), np.array([0.0, 0.0, 0.5]))))  # swings up
+
+
+@pytest.mark.parametrize(("side", "inward"), [("L", -0.1), ("R", 0.1)])
+def test_a_fist_that_rises_past_the_face_strikes_with_a_bent_elbow(side: str, inward: float) -> None:
+    low, chest, head = np.array([0.0, -0.25, 0.2]), np.array([inward, -0.05, 0.33]), np.array([inward, 0.2, 0.3])
+    uppercut = body(_striking(low, head, side))
+    assert np.ptp(uppercut.bend(side, "elbow")) < 40
+    assert shows("punch", uppercut)
+    assert not shows("punch", body(_striking(low, chest, side)))  # stops under the chin
+    assert not shows("punch", body(_striking(np.array([inward, 0.0, 0.12]), head, side)))  # is at the chin before
 
 
 def test_a_strike_is_no_dodge() -> None:

@@ -30,6 +30,8 @@ Point = tuple[float, float, float]
 
 GUARD: Mapping[str, Point] = {LEFT: (0.06, -0.02, 0.22), RIGHT: (0.08, -0.05, 0.17)}
 """Places of the wrists in guard: outward, up and forward of the middle of the shoulders, metres; the left leads."""
+LEAD_M = 0.06
+"""Metres by which the fist of the leading hand goes further: its shoulder is ahead of the other in the stance."""
 ELBOW = (0.45, -1.0, -0.1)
 FIRST_S, LAST_S = 0.5, 0.35
 """Seconds in guard before the first strike and after the last one, at least."""
@@ -74,6 +76,13 @@ class _Strike:
         twist, sink = (tuple(body * each for each in values) for values in (self.twist, self.sink))
         return replace(self, times=(0.0, *steps, end), twist=twist, sink=sink)
 
+    def on(self, side: str) -> tuple[Point, ...]:
+        """Return the way of the fist of a side; the leading one goes further where it strikes."""
+        if side != LEFT:
+            return self.way
+        wound = min(z for _, _, z in self.way)
+        return tuple((x, y, z + (LEAD_M if z > wound + 0.2 else 0.0)) for x, y, z in self.way)
+
     @property
     def seconds(self) -> float:
         """Seconds from guard to guard."""
@@ -93,7 +102,7 @@ _HOOK = _Strike(
 )
 _UPPERCUT = _Strike(
     (0.0, 0.26, 0.38, 0.47, 0.56, 0.92),
-    ((0.16, -0.34, 0.06), (0.07, -0.17, 0.2), (-0.02, 0.06, 0.44), (-0.05, 0.22, 0.4)),
+    ((0.16, -0.30, 0.06), (0.07, -0.17, 0.2), (-0.02, 0.06, 0.45), (-0.05, 0.23, 0.42)),
     (0.0, -20.0, -6.0, 26.0, 30.0, 0.0),
     (0.3, -1.0, -0.2),
     0.5,
@@ -162,7 +171,7 @@ def _struck(body: StandingBody, fps: float, strikes: list[tuple[float, _Strike, 
     elbows = {side: np.tile(ELBOW, (frames, 1)) for side in ARMS}
     for start, strike, side in strikes:
         inside = (time >= start) & (time < start + strike.seconds)
-        points = [GUARD[side], *strike.way, GUARD[side]]
+        points = [GUARD[side], *strike.on(side), GUARD[side]]
         since = time[inside] - start
         ways[side][inside] = way_through(since, strike.times, points)
         turned = way_through(since, strike.times, strike.twist)

@@ -44,10 +44,11 @@ def fight_stance(body: Body) -> bool:
 
 
 def _strikes(body: Body, side: str) -> int:
-    """Count the movements of a fist at 2 m/s or more, straight ahead or past the face.
+    """Count the movements of a fist at 2 m/s or more, straight ahead, across the face or up past it.
 
-    In each the elbow straightens by 40 degrees and the fist goes 0.12 m away from its shoulder, to before the body;
-    arms that swing about the shoulder do not.
+    In each the fist goes 0.12 m away from its shoulder, to before the body; arms that swing about the shoulder do not.
+    Ahead and across the elbow straightens by 40 degrees. An uppercut may keep it bent: its fist rises from under the
+    chin to the height of the head.
     """
     velocity = body.own_velocity(f"{side}_wrist", window=0.06)
     speed = np.linalg.norm(velocity, axis=-1)
@@ -59,15 +60,24 @@ def _strikes(body: Body, side: str) -> int:
         part = slice(first, last)
         far = first + int(reach[part].argmax())
         way = slice(first, far + 1)
-        pushes = elbow[way].max() - elbow[far] >= 40 and reach[far] - reach[way].min() >= 0.12 and before[far] >= 0.2
+        goes_out = reach[far] - reach[way].min() >= 0.12 and before[far] >= 0.2
+        straightens = elbow[way].max() - elbow[far] >= 40
         ahead = velocity[begin:end, 2].max() > 1.2 or velocity[begin:end, 1].max() > 1.5
         straight = elbow[part].min() < 50 and hand[part][:, 2].max() > 0.25
         past_face = (
             (hand[part][:, 1].max() > -0.15) and hand[part][:, 2].max() > 0.2 and float(np.ptp(hand[part][:, 0])) > 0.2
         )
-        if ahead and pushes and (straight or past_face):
+        across = ahead and straightens and (straight or past_face)
+        if goes_out and (across or _rises_past_face(hand[part], velocity[begin:end])):
             found += 1
     return found
+
+
+def _rises_past_face(hand: Floats, velocity: Floats) -> bool:
+    """Return True if a fist, seen from the neck, comes up before the body from under the chin to the head."""
+    top = int(hand[:, 1].argmax())
+    middle = abs(hand[top, 0]) < 0.25 and hand[:, 2].max() > 0.25
+    return bool(middle and velocity[:, 1].max() > 1.5 and hand[0, 1] < -0.15 and hand[top, 1] > 0.05)
 
 
 @rule("punch")

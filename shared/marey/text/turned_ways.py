@@ -1,0 +1,55 @@
+"""Turns that are told in words of which models read another action: "hangs a sharp left", "wheels about"."""
+
+from __future__ import annotations
+
+import re
+
+_TAKES_A_LEFT = re.compile(
+    r"""\b(?:take|make|hang|do)(?P<s>s)?\ (?P<how>an?\ (?:[\w-]+\ )?)(?P<side>left|right)
+    (?=\W*$|[.,;]|\ (?:at|into|onto|around|round|down|up|along|past|towards?
+    |and|then|while|before|after|behind)\b)""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""A turn of which the side alone is named."""
+_WHEELS = re.compile(
+    r"""(?<!cart)(?<!\ba\ )(?<!\bthe\ )\bwheel(?P<s>s|ing)?\ (?:around|about|round)\b(?!\ (?:the|a|an|his|her|in)\b)""",
+    re.IGNORECASE | re.VERBOSE,
+)
+_WHIRLS = re.compile(
+    r"""\b(?:whirl|spin|twirl|swing)(?P<s>s|n?ing)?\ (?:around|about|round)\b
+    (?=,?\ (?:to|and)\ (?:faces?|looks?|confronts?|meets?|sees?|stares?|glances?|checks?)\b)""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""A turn to face what is behind, of which models read whole turns."""
+_FACES = re.compile(r"\b(?:execute|do|perform|make|snap)(?P<s>e?s)? an? (?P<side>left|right)[ -]face\b", re.IGNORECASE)
+"""A turn on the spot of a drill."""
+_RUNS_AND_TURNS = re.compile(
+    r"""\b(?P<way>(?:run|jog|trot|sprint)(?:s|(?:n|g|t)?ing)?)(?P<how>\ \w+ly)?\ and
+    \ (?:turn|curve|bear|veer|swerve|bend)(?P<s>s)?(?P<far>\ \w+ly|\ hard)?\ (?:to\ (?:the|his|her|their)\ )?
+    (?P<side>left|right)(?=\W*$|[.;])""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""A run with a turn to a side, of which models read a run ahead."""
+
+
+def with_turns_told(prompt: str) -> str:
+    """Return a prompt in which such turns are told as the vocabulary does."""
+    text = _TAKES_A_LEFT.sub(r"take\g<s> \g<how>\g<side> turn", prompt)
+    text = _WHIRLS.sub(_turns, _WHEELS.sub(_turns, text))
+    text = _FACES.sub(lambda found: f"turn{_s(found)} {found['side']} 90 degrees in place", text)
+    return _RUNS_AND_TURNS.sub(_takes_a_turn, text)
+
+
+def _s(found: re.Match[str]) -> str:
+    return "s" if found["s"] else ""
+
+
+def _turns(found: re.Match[str]) -> str:
+    """Return a quick turn to face back, in the form of the verb that is found."""
+    end = (found["s"] or "").lower()
+    return f"turn{'ing' if end.endswith('ing') else end} around quickly"
+
+
+def _takes_a_turn(found: re.Match[str]) -> str:
+    """Return a way that takes a turn."""
+    return f"{found['way']}{found['how'] or ''} and take{_s(found)} a {found['side']} turn{found['far'] or ''}"
