@@ -9,74 +9,12 @@ from marey.text.action_reader import named_actions
 from marey.text.blows_met import with_blows_met
 from marey.text.dropped_seats import with_seats_taken
 from marey.text.lost_footing import with_falls
+from marey.text.misleading_ways import with_exits, with_stairs_down, with_turns_between, with_ways_ahead
 from marey.text.punched_air import with_pumped_fists
 from marey.text.turned_ways import with_turns_told
 from marey.vocabulary.bearing_words import stated_bearings
 from marey.vocabulary.scope import STANDING
 
-_UP_TO = re.compile(
-    r"""\b(?P<way>(?:walk|run|jog|stroll|stride|march|step|go|come|sneak)(?:s|es|ing)?)\ (?:right\ |straight\ )?up\ to
-    (?=\ (?:the|a|an|him|her|them|his|their|me|you)\b)
-    (?!(?:\ \w+){1,2}\ (?:roof|attic|top|floor|summit|peak|stairs?|tower)\b)""",
-    re.IGNORECASE | re.VERBOSE,
-)
-_DOWN = re.compile(
-    r"""\bdown(?=\ (?:the|a|an|his|her|their|this|that)\ (?:[\w-]+\ ){0,2}
-    (?:road|street|hall|hallway|corridor|aisle|path|catwalk|runway|alley|lane|sidewalk|pavement|avenue|track|beach
-    |boardwalk|river|shore|trail|block|line|row|tunnel)\b)""",
-    re.IGNORECASE | re.VERBOSE,
-)
-_GAITS = r"walk|run|jog|stroll|stride|march|sprint|hurry|hurri|trot|wander|trudge|limp|rush"
-_RETURN = re.compile(
-    rf"""\b(?P<way>(?:{_GAITS}|go|head|make(?P<his>s?\ (?:his|her|their|its)\ way)?)(?:e?s|ing)?)\ back
-    (?=\ (?:to|home|into|in|inside|towards?|again|through|across|along|down|up)\b)(?!\ (?:and|to\ back)\b)""",
-    re.IGNORECASE | re.VERBOSE,
-)
-"""A way to where the person was before: "walks back to his car"."""
-_TURNED_BACK = re.compile(
-    rf"""(?P<turn>\b(?:turns?|turning|spins?|spinning|whirls?|swings?|wheels?|pivots?|does\ an\ about[ -]face)
-    (?:\ (?:around|round|about|back))?(?:\ 180(?:\ degrees|°)?)?
-    (?:[,.;]|,?\ (?:and(?:\ then)?|then|to)|\ ?(?:->|→|>))\ )
-    (?P<way>(?:{_GAITS}|go)(?:e?s|ing)?)\ back(?!wards?\b|\ (?:and|to|home|into|in|inside)\b)""",
-    re.IGNORECASE | re.VERBOSE,
-)
-"""A way behind a turn: "turns around and walks back"."""
-WAYS_TO_AND_FRO = 3
-"""Ways of who paces back and forth."""
-_STEPS = r"(?:stairs|steps|staircase|stairway|stairwell|flight(?:\ of\ (?:stairs|steps))?)"
-_DOWN_AGAIN = re.compile(
-    rf"""(?P<up>\b(?:(?:climb|ascend|mount)(?:s|ed|ing)?|[a-z]+\ (?:\w+ly\ )?up)\ (?!down\b|and\b)
-    [^.;]{{0,40}}?\b{_STEPS}\b|\b[a-z]+\ upstairs\b)
-    (?P<more>[^.;]{{0,60}}?)(?P<joint>,?\ (?:and\ then|and|then|before)\ |,\ )
-    (?:(?:he|she|they)\ )?(?:\w+ly\ )?
-    (?P<way>(?:{_GAITS}|go|head|com|step|climb)(?:e?s|ies|ing|e|y)?\ )?(?P<back>back\ )?down(?:\ again)?
-    (?:\ (?:(?:the|those|these)\ )?(?:{_STEPS}|them))?(?:\ again)?(?=\W*$|[,.;]|\ (?:and|then)\b)""",
-    re.IGNORECASE | re.VERBOSE,
-)
-"""Stairs that are gone down again: "walks up the stairs and then back down"."""
-_UP_AND_DOWN = re.compile(
-    rf"""\b(?P<way>[a-z]+)(?P<how>\ \w+ly)?\ up\ and\ (?:back\ |then\ )?down
-    \ (?P<steps>(?:the|a|some|his|her)\ {_STEPS})\b""",
-    re.IGNORECASE | re.VERBOSE,
-)
-"""The same in one breath: "runs up and down the stairs"."""
-_TO_AND_FRO = re.compile(
-    r"""\b(?P<way>pac|walk|strid|stride|march|wander|stroll|run|runn|jog|jogg)(?P<end>es|s|ing|e)?[ ]
-    (?:(?:nervous|anxious|impatient|restless|angr|slow|quick)\w*\ )?
-    (?:back\ and\ forth|to\ and\ fro|up\ and\ down(?!\ (?:the\ )?(?:stairs?|steps|hill)))
-    (?:(?:\ (?:nervous|anxious|impatient|restless|angr|slow|quick)\w*)?
-    \ (?:for\ (?:a\ (?:while|long\ time|bit)|some\ time)|again\ and\ again|over\ and\ over|repeatedly
-    |(?:several|many|a\ few)\ times))?""",
-    re.IGNORECASE | re.VERBOSE,
-)
-"""A way with turns: "paces back and forth"."""
-_EXITS = re.compile(
-    r"""\b(?:exit|leave|head|go)(?P<end>e?s|ing)?(?:\ (?:the\ )?(?:stage|scene|screen|frame|off|away|out))*
-    (?:\ (?:to|towards?)\ (?:the|his|her|their)|\ stage|\ screen|(?<=exits)|(?<=heads)|(?<=exit)|(?<=head))
-    \ (?P<side>left|right)\b(?!\ (?:hand|arm|foot|leg|shoulder|side|elbow|fist))""",
-    re.IGNORECASE | re.VERBOSE,
-)
-"""A way to a side whose verb names no gait: "exits stage left"."""
 _STRUCK = re.compile(
     r"""\b(?P<is>is|are|gets?|got|getting|being)[ ](?P<how>\w+ly\ )?
     (?:stabbed|kicked|slashed|slapped|pushed|shoved|bitten|tackled|clubbed|headbutted|elbowed|kneed|whipped|smacked
@@ -124,6 +62,7 @@ _AT_WHEEL = re.compile(
 _ACTS_THEMSELVES = (
     "guard|sentry|boxer|archer|climber|drinker|swimmer|dancer|ballerina|jogger|runner|walker|pilot|driver|referee"
     "|goalkeeper|goalie|kicker|puncher|fighter|wrestler|fencer|crawler|shooter|golfer|skater|skier|diver|kickboxer"
+    r"|(?:kung[ ]?fu|karate|judo|taekwondo|tae[ ]kwon[ ]do|martial[ ]arts?|tai[ ]chi)[ ]\w+"
 )
 _DOER = re.compile(
     rf"""^(?P<who>\W*(?:(?:a|an|the|this|that|one|another)\ )?
@@ -133,6 +72,14 @@ _DOER = re.compile(
     re.IGNORECASE | re.VERBOSE,
 )
 """The subject of one movement whose noun is that of an action: "the guard waits", "a boxer stands up"."""
+_POINTS_TO = re.compile(
+    r"""\b(?P<points>point(?:s|ing)?)\ (?:over\ )?to(?=\ (?:the|a|an|his|her|their|its|some\w*|him|her|them|me|you)\b)
+    (?!\ (?:the|his|her|their|its)\ (?:left|right|side|sky|ceiling|ground|floor|head|chest|eyes?|face|self))""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""A thing that is pointed at."""
+_DOES = ("does", "executes", "throws", "delivers", "lands")
+"""Verbs of which the object alone says what is done."""
 _PREPARED = re.compile(r"\b(?:stance|fists?|guard|ready|bounc\w+|shadow)\b", re.IGNORECASE)
 """Words of who stands as the noun says: "a boxer stands ready"."""
 _JOINED = re.compile(r"\b(?:and(?! (?:forth|fro|right|left))|then|before|until|after)\b", re.IGNORECASE)
@@ -351,7 +298,7 @@ def without_misleading(prompt: str) -> str:
     dancer who leaps does so from one foot to the other.
     """
     prompt = with_turns_told(with_blows_met(prompt))
-    prompt = _DOWN_AGAIN.sub(_down_again, _UP_AND_DOWN.sub(_up_and_down, prompt))
+    prompt = with_stairs_down(prompt)
     prompt = _DANCER_LEAPS.sub(_performs_a_leap, with_falls(with_seats_taken(prompt)))
     prompt = _DOER.sub(_as_person, _AT_WHEEL.sub(r"\g<drives>", prompt))
     prompt = _LAYS_LEG.sub(r"\g<sits> with one leg over the other", prompt)
@@ -360,12 +307,11 @@ def without_misleading(prompt: str) -> str:
     prompt = _SPINS_AROUND.sub(r"\g<spins> ", _TO_BOTH_SIDES.sub(r"\g<work>", prompt))
     prompt = _SIDEWAYS.sub(r"\g<way>\g<how> sideways", prompt)
     prompt = _HAND_OVER_HAND.sub("climbing ", _UP_ROPE.sub(_climbs, prompt))
-    text = _DOWN.sub("along", _UP_TO.sub(r"\g<way> to", prompt))
-    text = _RETURN.sub(r"\g<way>", _TURNED_BACK.sub(r"\g<turn>\g<way> forward", text))
+    text = with_ways_ahead(_POINTS_TO.sub(r"\g<points> at", prompt))
     text = _STRIKES_BACK.sub(_strikes_back, _TURNS_IN_AIR.sub(_with_turn, text))
     text = _TO_KNEES.sub(_kneels, _OVER_KNEES.sub(_falls_over_knees, text))
-    text = _EXITS.sub(_walks_off, with_pumped_fists(text))
-    text = _STRUCK_DOWN.sub("", _TO_AND_FRO.sub(_with_turns, text))
+    text = with_exits(with_pumped_fists(text))
+    text = _STRUCK_DOWN.sub("", with_turns_between(text))
     text = _STRUCK.sub(_hit, _SHOT_DEAD.sub(r"\g<is> killed", text))
     text = _HIT_AND_STUMBLES.sub(r"\g<hit> hard", _SHOT.sub("gets hit", text))
     text = _ROLLS_FROM_THERE.sub(_rolls_onto, text)
@@ -379,7 +325,8 @@ def _as_person(found: re.Match[str]) -> str:
     same bearings of anybody; else as it is."""
     does, verb = found["does"], found["verb"].lower()
     named = named_actions(f"a person{does}")
-    if not named or _JOINED.search(does) or (verb != STANDING and not named_actions(f"a person {verb}")):
+    acts = verb in (STANDING, *_DOES) or named_actions(f"a person {verb}")
+    if not named or _JOINED.search(does) or not acts:
         return found[0]
     if lunges_as_exercise(does) and not lunges_as_exercise(found[0]):
         return found[0]
@@ -408,52 +355,11 @@ def _climbs(found: re.Match[str]) -> str:
     return f"climb{'ing' if end.endswith('ing') else 's' if end.endswith('s') else ''}{found['how']}"
 
 
-def _up_and_down(found: re.Match[str]) -> str:
-    """Return a way up stairs and down, told one after the other."""
-    way, how, steps = found["way"], found["how"] or "", found["steps"]
-    return f"{way}{how} up {steps}, {_as_verb(way, 'turn')} around and {way}{how} down {steps}"
-
-
-def _down_again(found: re.Match[str]) -> str:
-    """Return a way up stairs, the turn at their end, and the way down."""
-    if not (found["way"] or found["back"]):
-        return found[0]
-    verb = found["up"].split()[0]
-    way = (found["way"] or _as_verb(verb, "walk")).strip()
-    turned = re.search(r"\b(?:turn|spin|pivot)\w*", found["more"], re.IGNORECASE)
-    joint = found["joint"] if turned else f", {_as_verb(verb, 'turn')} around and "
-    return f"{found['up']}{found['more']}{joint}{way} down the stairs"
-
-
-def _as_verb(said: str, verb: str) -> str:
-    """Return a verb in the form of another one."""
-    end = next((end for end in ("ing", "s") if said.lower().endswith(end)), "")
-    return f"{verb}{end}"
-
-
 def _on_floor(found: re.Match[str]) -> str:
     """Return a seat on the floor, unless the prompt names another one."""
     if _SEAT.search(found.string):
         return found[0]
     return f"{found['sits']} down{found['how'] or ''} on the floor{found['legs']}"
-
-
-def _with_turns(found: re.Match[str]) -> str:
-    """Return a way to and fro, told as ways and turns."""
-    end, way = (found["end"] or "").removesuffix("e"), found["way"].lower()
-    way = "jog" if way.startswith("jog") else "run" if way.startswith("run") else "walk"
-    if end.endswith("ing"):
-        goes, turns = f"{way}{way[-1] if way != 'walk' else ''}ing forward", "turning around"
-        return ", ".join([goes, *[f"{turns} and {goes}"] * (WAYS_TO_AND_FRO - 1)])
-    goes, turns = (f"{way}s forward", "turns around") if end else (f"{way} forward", "turn around")
-    between = f", {turns}, {goes}" * (WAYS_TO_AND_FRO - 2)
-    return f"{goes}{between}, {turns} and {goes}"
-
-
-def _walks_off(found: re.Match[str]) -> str:
-    """Return a way to a side as a walk."""
-    end = (found["end"] or "").lower()
-    return f"walk{'ing' if end == 'ing' else 's' if end else ''} off to the {found['side']}"
 
 
 def _with_turn(found: re.Match[str]) -> str:

@@ -23,6 +23,12 @@ _WHIRLS = re.compile(
 """A turn to face what is behind, of which models read whole turns."""
 _FACES = re.compile(r"\b(?:execute|do|perform|make|snap)(?P<s>e?s)? an? (?P<side>left|right)[ -]face\b", re.IGNORECASE)
 """A turn on the spot of a drill."""
+_ABOUT_FACES = re.compile(
+    r"""(?<!\ban\ )(?<!\bthe\ )(?<!\bhis\ )(?<!\bher\ )\b(?:(?P<turns>turn)(?:s|ing)?\ )?
+    about[ -](?:face|turn)(?P<s>s|ing)?(?=\W*$|[,.;]|\ (?:and|then|before)\b)""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""The same by its command as a verb: "about-faces and marches off"."""
 _RUNS_AND_TURNS = re.compile(
     r"""\b(?P<way>(?:run|jog|trot|sprint)(?:s|(?:n|g|t)?ing)?)(?P<how>\ \w+ly)?\ and
     \ (?:turn|curve|bear|veer|swerve|bend)(?P<s>s)?(?P<far>\ \w+ly|\ hard)?\ (?:to\ (?:the|his|her|their)\ )?
@@ -37,6 +43,7 @@ def with_turns_told(prompt: str) -> str:
     text = _TAKES_A_LEFT.sub(r"take\g<s> \g<how>\g<side> turn", prompt)
     text = _WHIRLS.sub(_turns, _WHEELS.sub(_turns, text))
     text = _FACES.sub(lambda found: f"turn{_s(found)} {found['side']} 90 degrees in place", text)
+    text = _ABOUT_FACES.sub(_faces_about, text)
     return _RUNS_AND_TURNS.sub(_takes_a_turn, text)
 
 
@@ -48,6 +55,14 @@ def _turns(found: re.Match[str]) -> str:
     """Return a quick turn to face back, in the form of the verb that is found."""
     end = (found["s"] or "").lower()
     return f"turn{'ing' if end.endswith('ing') else end} around quickly"
+
+
+def _faces_about(found: re.Match[str]) -> str:
+    """Return a turn to face back; as it is where it is no verb."""
+    said = found[0].lower()
+    if not (found["turns"] or found["s"]):
+        return found[0]
+    return f"turn{'ing' if 'ing' in said else 's'} around"
 
 
 def _takes_a_turn(found: re.Match[str]) -> str:

@@ -49,8 +49,16 @@ _SIDE = r"(?:(?:back |quickly |slowly |briefly )?(?:to (?:the|his|her|their|its)
 _ANY = "|".join(f"(?P<{name}>{words})" for name, words in _WHERE.items())
 _LOOKS = re.compile(
     r"\b(?:look|glanc|gaz|peer|star|scan|check)(?:s|e|es|ing|ed)?\b"
-    r"|\b(?:turn|tilt|mov)(?:s|e|es|ing)? (?:(?:his|her|their|its|the) )?head\b(?: (?:to|and) (?:look|glance|peer)s?\b)?"
+    r"|\b(?:turn|tilt|mov)(?:s|e|es|ing)? (?:(?:his|her|their|its|the) )?head\b"
+    r"(?: (?:to|and) (?:look|glance|peer)s?\b)?"
 )
+_TURNS_HEAD = re.compile(
+    r"\bturn(?:s|ing)? (?:his|her|their|its|the) head"
+    r"(?: (?:\w+ly|away|aside|sideways|to (?:the|one) side|a little|a bit))*"
+    r"(?! and (?:(?:his|her|their|its) )?(?:body|shoulders|torso|trunk|neck)\b)"
+    r"(?=\W*$|[.,;!]| (?:and|then|while|as|before|until)\b)"
+)
+"""A head that turns to no side that is named."""
 _STEP = re.compile(rf"(?:\s*,?\s*(?:and |then |and then )?(?:{_SIDE}))(?:{_ANY})\b(?!-)")
 _SHAKES = re.compile(r"\bshak(?:e|es|ing) (?:(?:his|her|their|its|the) )?head\b(?: no\b)?|\bhead[ -]shak(?:e|ing)\b")
 _TWICE = re.compile(
@@ -110,6 +118,7 @@ def _spans(prompt: str) -> Iterator[tuple[int, int, list[Glance]]]:
         found.append(
             (again.start(), again.end(), [cast("Glance", f"twice_{again['side']}" if again["side"] else "twice")])
         )
+    found += [(each.start(), each.end(), ["around"]) for each in _TURNS_HEAD.finditer(text)]
     for looks in _LOOKS.finditer(text):
         at, glances = looks.end(), list[Glance]()
         while (step := _STEP.match(text, at)) is not None:

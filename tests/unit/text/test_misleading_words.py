@@ -195,7 +195,7 @@ def test_the_hands_of_a_driver_are_not_said(prompt: str, read: str) -> None:
         ("boxer", "boxer"),
         ("keep your guard up and kick", "keep your guard up and kick"),
         ("a boxer stands with fists raised", "a boxer stands with fists raised"),
-        ("a guard walks in, turns and leaves", "a guard walks in, turns and leaves"),
+        ("a guard walks in, turns and bows", "a guard walks in, turns and bows"),
     ],
 )
 def test_who_does_something_else_than_the_noun_says_is_a_person(prompt: str, read: str) -> None:

@@ -20,6 +20,8 @@ from marey.text.turned_ways import with_turns_told
         ("the soldier executes a right face", "the soldier turns right 90 degrees in place"),
         ("jogs and turns sharply to the left", "jogs and takes a left turn sharply"),
         ("run and bear right", "run and take a right turn"),
+        ("the sentry about-faces and marches off", "the sentry turns around and marches off"),
+        ("turns about-face, then salutes", "turns around, then salutes"),
     ],
 )
 def test_turns_are_told_as_such(prompt: str, told: str) -> None:
@@ -40,6 +42,7 @@ def test_turns_are_told_as_such(prompt: str, told: str) -> None:
         "makes a right fist",
         "runs and turns left, then right",
         "runs and turns around",
+        "does an about-face and salutes",
     ],
 )
 def test_what_is_no_such_turn_stays(prompt: str) -> None:

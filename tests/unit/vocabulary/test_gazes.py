@@ -10,6 +10,21 @@ from marey.vocabulary.gazes import only_gaze, stated_gaze, without_gaze
 @pytest.mark.parametrize(
     ("prompt", "gaze"),
     [
+        ("a robot turns its head to the right", ("right",)),
+        ("the creature looks over its shoulder", ("behind",)),
+        ("she turns her head", ("around",)),
+        ("turns his head slowly and waves", ("around",)),
+        ("turns his head and body towards the door", ()),
+        ("does not turn her head", ()),
+    ],
+)
+def test_heads_of_creatures_turn_and_those_that_turn_nowhere_in_particular(prompt: str, gaze: tuple[str, ...]) -> None:
+    assert stated_gaze(prompt) == gaze
+
+
+@pytest.mark.parametrize(
+    ("prompt", "gaze"),
+    [
         ("look left, look right", ("left", "right")),
         ("drives and checks the left mirror", ("left",)),
         ("glances in the rear-view mirror", ("right",)),
