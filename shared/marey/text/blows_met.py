@@ -46,10 +46,13 @@ _STAGGERED = re.compile(
     rf"""\b(?P<verb>{_forms(_STAGGERS)})(?:{_ASIDE}*
     ,?\ (?:when|as|after|once|while|from)\ (?:(?:he|she|they)\ )?(?:(?:is|are|being|gets?|getting|having\ been)\ )?
     {_STRUCK}|(?!\ back){_ASIDE}*\ (?:from|after|under)\ (?:an?|the|another)\ {_SUCH}{_BLOW})\b
+    (?!,?\ (?:(?:and|then|before)\ )*(?:(?:he|she|they)\ )?(?:\w+ly\ )?
+    (?:fall|collaps|drop|crumpl|toppl|go(?:es)?\ down|die))
     (?:\ to(?=\ (?:the|his|her|their)\b))?""",
     re.IGNORECASE | re.VERBOSE,
 )
-"""A body that a blow moves: "staggers when punched", "reels from a hook"; "staggers back" is known."""
+"""A body that a blow moves: "staggers when punched", "reels from a hook"; "staggers back" is known. Who
+falls then does both."""
 _SENDS = re.compile(
     rf"""(?:^|(?<=[.;,]\ )){_DET}{_SUCH}{_BLOW}(?:\ {_WHERE})?
     \ (?:(?:makes|has|lets)\ (?P<who>him|her|them|{_DET}[\w-]+)\ (?:{"|".join(_STAGGERS)}|flinch|recoil|wince)

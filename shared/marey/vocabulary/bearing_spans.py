@@ -37,7 +37,7 @@ _LIKE = re.compile(
 _DENIED = re.compile(
     r"\b(?:(?:without|not|never|no|n't|don't|doesn't)\s+(?:(?!and\b|then\b)\w+\s+){0,2}"
     r"|(?:avoids?|instead of)\s+"
-    r"|(?:until|when|if|because|before|after)\s+(?:(?:he|she|they|it|the \w+)\s+)?(?:(?:is|are)\s+)?)$"
+    r"|(?:until|when|if|because|before|after)\s+(?:(?:he|she|they|it|the \w+)(?:'s)?\s+)?(?:(?:is|are)\s+)?)$"
 )
 _STOPPED = re.compile(r"\bstops?\s+$")
 """Words behind which others say what comes to an end: "stops waving", but not "stops with his hands on his knees"."""

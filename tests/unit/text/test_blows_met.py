@@ -69,7 +69,7 @@ def test_what_meets_no_blow_stays(prompt: str) -> None:
 
 def test_they_are_told_before_a_prompt_is_read() -> None:
     assert without_misleading("leans away from a sword swing") == "dodges an attack"
-    assert without_misleading("reels from a hook and falls") == "falls", "a blow is part of the fall behind it"
+    assert without_misleading("reels from a hook and falls") == "reels from a hook and falls", "it is hit, and falls"
 
 
 @pytest.mark.parametrize("limb", ["left arm", "forearm", "hand", "right knee"])
