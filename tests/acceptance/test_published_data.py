@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -53,6 +54,27 @@ def test_both_models_train_on_a_published_folder(prepared: Path, model: str, tex
     assert (manifest.text.encoder, manifest.text.labeller, manifest.text.in_order) == ("clip-vit-b32", "light", False)
     if model == "hgm3":
         assert (manifest.text.max_actions, manifest.text.max_specifics) == (4, 8)
+
+
+def test_mogo_trains_on_a_copy_of_the_folder_with_text_of_its_own_encoder(prepared: Path, tmp_path: Path) -> None:
+    if prepared.parent.name.startswith("kit"):
+        pytest.skip("the text is that of HumanML3D")
+    (tmp_path / "clip").mkdir()
+    write_tiny_clip(tmp_path / "clip", 768)
+    shutil.copytree(prepared, tmp_path / "data")
+    (tmp_path / "mine.toml").write_text(MOGO.format("").replace("512", "768"))
+    chosen = ("--run", tmp_path / "run", "--config", tmp_path / "mine.toml")
+    words = ["train", "mogo", "all", tmp_path / "data", *chosen, "--steps", 1, "--max-minutes", 5, "--threads", 1]
+    refused = CliRunner().invoke(app, [str(word) for word in words])
+    assert refused.exit_code == 2
+    assert "texts have width 512; this configuration reads 768" in refused.stderr
+    run("data", "text", tmp_path / "data", "--encoder", "clip-vit-l14", "--labeller", "none", "--as-written",
+        "--weights", tmp_path / "clip")  # fmt: skip
+    run(*words)
+    run("train", "mogo", "bundle", tmp_path / "data", *chosen, "-o", tmp_path / "bundle")
+    text = Bundle.open(tmp_path / "bundle").manifest.text
+    assert text is not None
+    assert (text.encoder, text.width, text.labeller) == ("clip-vit-l14", 768, "none")
 
 
 def test_the_text_of_a_folder_names_encoder_and_labeller(prepared: Path) -> None:

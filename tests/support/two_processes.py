@@ -1,4 +1,4 @@
-"""Training of a tiny model by two processes, which torchrun starts on a CPU (gloo).
+"""Training of a tiny model by two processes, which torchrun starts on a CPU (gloo): by functions, and by the command.
 
 torchrun --nproc-per-node=2 -m tests.support.two_processes FOLDER MODEL
 """
@@ -6,12 +6,14 @@ torchrun --nproc-per-node=2 -m tests.support.two_processes FOLDER MODEL
 from __future__ import annotations
 
 import faulthandler
+import json
 import os
 import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -27,7 +29,7 @@ from marey.nn.quantizer import ResidualQuantizer
 from marey.registry import Training, find_model, resolve
 from marey.training import loop, staging
 from marey.training.budget import Budget
-from marey.training.checkpoint import TrainingState, save_checkpoint
+from marey.training.checkpoint import TrainingState, restore_previous, save_checkpoint
 from marey.training.staging import TrainOptions
 from tests.support.prepared import write_prepared
 
@@ -35,6 +37,10 @@ ROOT = Path(__file__).parents[2]
 STEPS = 4
 DEADLINE = 150
 """Seconds after which a process that hangs says where, and ends."""
+WHOLE = 12
+"""Steps of the training whose processes are killed."""
+PATIENCE = 400
+"""Seconds that a command may take: on busy cores each exchange of gradients waits for both processes."""
 
 
 def check_two_processes(folder: Path, model: str) -> set[str]:
@@ -61,6 +67,68 @@ def check_two_processes(folder: Path, model: str) -> set[str]:
     )
     assert all((whole[name] == resumed[name]).all() for name in whole)
     return {path.parent.parent.name for path in (folder / "run").glob("*/part/part.json")}
+
+
+def check_killed_and_resumed(folder: Path, model: str, stages: Sequence[str], killed: str) -> None:
+    """Train stages of a model by the command, under torchrun, once whole and once with both processes killed in a stage
+    and resumed: its weights are the same, bit for bit.
+
+    Args:
+        folder: for data and runs.
+        model: its name.
+        stages: to train before `killed`.
+        killed: the stage whose processes are killed.
+    """
+    write_prepared(folder / "prepared")
+    for stage in stages:
+        run_command(folder, model, stage, "run", steps=2)
+    shutil.copytree(folder / "run", folder / "again")
+    run_command(folder, model, killed, "run", steps=WHOLE)
+    state = folder / "again" / killed / "checkpoint" / "state.json"
+    with start_command(folder, model, killed, "again", "--checkpoint-minutes", 0, steps=WHOLE) as process:
+        try:
+            wait_for(lambda: state.is_file() or process.poll() is not None)
+        finally:
+            os.killpg(process.pid, signal.SIGKILL)
+    restore_previous(state.parent)
+    step = json.loads(state.read_text())["step"]
+    assert 0 < step < WHOLE, "killed in the middle"
+    run_command(folder, model, killed, "again", "--resume", steps=WHOLE)
+    whole, resumed = (load_file(folder / run / killed / "part" / "weights.safetensors") for run in ("run", "again"))
+    assert all((whole[name] == resumed[name]).all() for name in whole)
+
+
+def start_command(
+    folder: Path, model: str, stage: str, run: str, *options: object, steps: int
+) -> subprocess.Popen[str]:
+    """Start `marey train` in two processes, as a group of its own."""
+    command = [sys.executable, "-m", "torch.distributed.run", "--standalone", "--nproc-per-node=2", "--",
+               str(Path(sys.executable).with_name("marey")), "train", model, stage, str(folder / "prepared"), "--run",
+               str(folder / run), "--config", "tiny", "--steps", str(steps), "--threads", "1", "--device", "cpu",
+               *map(str, options)]  # fmt: skip
+    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    return subprocess.Popen(
+        command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, env=environment, start_new_session=True
+    )
+
+
+def run_command(folder: Path, model: str, stage: str, run: str, *options: object, steps: int) -> None:
+    """Run `marey train` in two processes to its end."""
+    with start_command(folder, model, stage, run, *options, steps=steps) as process:
+        try:
+            _, errors = process.communicate(timeout=PATIENCE)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            raise
+    assert process.returncode == 0, errors[-3000:]
+
+
+def wait_for(happened: Callable[[], bool]) -> None:
+    """Wait until something has happened."""
+    until = time.monotonic() + PATIENCE
+    while not happened():
+        assert time.monotonic() < until, "it has not happened"
+        time.sleep(0.02)
 
 
 def quantize_with_an_empty_process(first: int) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,10 @@ from marey.core.errors import InvalidInput
 from marey.generation.candidates import best_clips
 from marey.models.hgm3 import ablation
 from marey.models.hgm3.bundle import random_bundle
-from marey.training.ablation import AblationRequest
+from marey.models.hgm3.generate import Generator, SamplingSettings
+from marey.training.ablation import DECIDES, AblationRequest, evaluation_texts, judge
+from marey.training.adherence import finished
+from tests.support.ablations import judge_by_two_prompts
 
 
 @pytest.fixture(scope="module")
@@ -59,6 +63,30 @@ def test_an_ablation_that_a_model_has_not_is_told_with_those_it_has(bundle: str,
     assert done.exit_code == InvalidInput.exit_code
     assert "has no ablation 'depth'" in done.stderr
     assert "masks (Hard and random masks" in done.stderr
+
+
+def test_an_ablation_judges_what_the_network_makes(
+    bundle: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A bundle whose rules draw nods is judged without them: they would be the same in every row."""
+    shutil.copytree(bundle, tmp_path / "tiny")
+    file = tmp_path / "tiny" / "manifest.json"
+    manifest = json.loads(file.read_text())
+    manifest["text"]["plain_action"] = True
+    file.write_text(json.dumps(manifest))
+    generator = Generator.load(str(tmp_path / "tiny"), device="cpu", threads=1)
+    assert generator.bundle.manifest.draws_bearings
+    asked = list[bool]()
+
+    def watched(some: Any, requests: Any, settings: Any) -> Any:
+        asked.extend(request.drawing for request in requests)
+        return finished(some, requests, settings)
+
+    monkeypatch.setattr("marey.training.adherence.finished", watched)
+    judge_by_two_prompts(monkeypatch)
+    rates = judge(generator, evaluation_texts(generator), SamplingSettings(steps=2, motion_steps=0, action_steps=0))
+    assert asked == [False, False]
+    assert 0 <= rates[DECIDES] <= 1
 
 
 def test_an_evaluator_measures_the_rows_of_an_ablation(

@@ -122,10 +122,11 @@ def test_float64_features_are_taken_over(published, tmp_path):
     assert PreparedData.open(tmp_path / "out").split("test")[0].length == 120
 
 
-def spoil_feature(folder: Path) -> None:
-    features = np.load(folder / "renamed_feats" / "gp_00001.npy")
-    features[5, 7] = np.nan
-    np.save(folder / "renamed_feats" / "gp_00001.npy", features)
+def spoil_features(folder: Path, mids: tuple[str, ...] = ("gp_00001", "m_gp_00001", "ep_00003")) -> None:
+    for mid in mids:
+        features = np.load(folder / "renamed_feats" / f"{mid}.npy")
+        features[45, 7] = np.nan
+        np.save(folder / "renamed_feats" / f"{mid}.npy", features)
 
 
 def narrow(folder: Path) -> None:
@@ -152,13 +153,13 @@ def negative(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("spoil", "message"),
     [
-        (spoil_feature, "NaN"),
+        (spoil_features, "gp_00001.npy holds NaN or infinite numbers; 3 of 5 clips cannot be read"),
         (narrow, r"shape \(301, 263\), not \(any, 296\)"),
         (cut, "st2_00002#30#210 ends at frame 210, the file holds 200"),
         (write_train("gp_00001\n"), "'gp_00001' is not a clip"),
         (write_train("../x#0#100\n"), "is not a clip"),
         (write_train("gp_00001#100#100\n"), "ends before it starts"),
-        (write_train("gp_00001#0#150\ngp_00001#0#150\n"), "is in train already"),
+        (write_train("gp_00001#0#150\ngp_00001#150#300\n"), "is in train already"),
         (write_train("ep_00003#0#99\n"), "has no captions"),
         (write_captions([]), "not a JSON object"),
         (write_captions({"gp_00001#0#150": {"manual": "text"}}), "manual is not a list"),
@@ -177,7 +178,7 @@ def test_a_broken_folder_is_named_and_nothing_is_left(spoil, message, published,
 
 @pytest.mark.parametrize(
     "file",
-    ["renamed_feats/ep_00003.npy", "all_caption_clean.json", "meta_data/mean.npy", "data_split_info/val_ids.txt"],
+    ["all_caption_clean.json", "meta_data/mean.npy", "data_split_info/val_ids.txt"],
 )
 def test_a_missing_file_is_named(file, published, tmp_path):
     (published / file).unlink()
@@ -185,6 +186,24 @@ def test_a_missing_file_is_named(file, published, tmp_path):
         prepare_snapmogen(published, tmp_path / "out")
     assert file in str(error.value)
     assert not (tmp_path / "out").exists()
+
+
+def test_a_few_unreadable_clips_are_left_out_and_many_are_refused(published, tmp_path):
+    (published / "renamed_feats" / "ep_00003.npy").unlink()
+    spoil_features(published, ("st2_00002",))
+    names = published / "data_split_info" / "train_ids.txt"
+    names.write_text("\ufeff" + names.read_text().replace("\n", "\r\n\r\n") + "gp_00001#0#150\n")
+    manifest = prepare_snapmogen(published, tmp_path / "out")
+    assert manifest.left_out == {
+        "ep_00003#0#120": "there is no renamed_feats/ep_00003.npy",
+        "st2_00002#30#210": "renamed_feats/st2_00002.npy holds NaN or infinite numbers",
+    }
+    train = [clip.id for clip in PreparedData.open(tmp_path / "out").split("train")]
+    assert train == ["gp_00001#0#150", "m_gp_00001#0#150"], "a name that a file repeats is one clip"
+    (published / "renamed_feats" / "m_gp_00001.npy").unlink()
+    with pytest.raises(NotFound, match="3 of 5 clips cannot be read"):
+        prepare_snapmogen(published, tmp_path / "none")
+    assert not (tmp_path / "none").exists()
 
 
 def test_no_training_clip_and_a_folder_in_use_are_refused(published, tmp_path):

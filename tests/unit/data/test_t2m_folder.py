@@ -131,24 +131,74 @@ def test_kit_is_read_at_its_own_rate(tmp_path: Path) -> None:
     assert data.manifest.sources[0].tier == "non-commercial"
 
 
-def test_a_few_missing_files_are_left_out_and_many_are_refused(published: Path, tmp_path: Path) -> None:
+def test_a_few_unreadable_clips_are_left_out_and_many_are_refused(published: Path, tmp_path: Path) -> None:
     (published / "new_joint_vecs" / "000003.npy").unlink()
-    with pytest.raises(NotFound, match=r"no new_joint_vecs/000003.npy; 1 of 8 clips have no file"):
+    (published / "texts" / "M000003.txt").unlink()
+    manifest = prepare_t2m(HUMANML3D_SET, published, tmp_path / "two")
+    assert manifest.left_out["000003"] == "there is no new_joint_vecs/000003.npy"
+    assert manifest.left_out["M000003"] == "there is no texts/M000003.txt"
+    assert not PreparedData.open(tmp_path / "two").split("val")
+    spoil("000004")(published)
+    with pytest.raises(NotFound, match=r"no new_joint_vecs/000003.npy; 3 of 8 clips cannot be read"):
         prepare_t2m(HUMANML3D_SET, published, tmp_path / "out")
     assert not (tmp_path / "out").exists()
-    more = [f"x{number}" for number in range(100)]
+    more = [f"x{number}" for number in range(300)]
     for name in more:
-        shutil.copy(published / "new_joint_vecs" / "000004.npy", published / "new_joint_vecs" / f"{name}.npy")
+        shutil.copy(published / "new_joint_vecs" / "M000003.npy", published / "new_joint_vecs" / f"{name}.npy")
         shutil.copy(published / "texts" / "000004.txt", published / "texts" / f"{name}.txt")
     (published / "test.txt").write_text("\n".join(more))
     manifest = prepare_t2m(HUMANML3D_SET, published, tmp_path / "out")
-    assert manifest.left_out["000003"] == "there is no new_joint_vecs/000003.npy"
+    assert manifest.kinds["captured"] == 2 + 300
 
 
-def nan(folder: Path) -> None:
-    features = np.load(folder / "new_joint_vecs" / "000001.npy")
-    features[5, 7] = np.nan
-    np.save(folder / "new_joint_vecs" / "000001.npy", features)
+def spoil(*names: str) -> Callable[[Path], object]:
+    """Put a number that is none into the features of clips."""
+
+    def spoiled(folder: Path) -> None:
+        for name in names:
+            features = np.load(folder / "new_joint_vecs" / f"{name}.npy")
+            features[5, 7] = np.nan
+            np.save(folder / "new_joint_vecs" / f"{name}.npy", features)
+
+    return spoiled
+
+
+def test_a_clip_whose_features_are_no_numbers_is_left_out(published: Path, tmp_path: Path) -> None:
+    spoil("000002", "M000002")(published)
+    manifest = prepare_t2m(HUMANML3D_SET, published, tmp_path / "out")
+    assert manifest.left_out["M000002"] == "new_joint_vecs/M000002.npy holds NaN or infinite numbers"
+    ids = [clip.id for clip in PreparedData.open(tmp_path / "out").split("train") if not clip.cropped]
+    assert ids == ["000001", "M000001"]
+
+
+def windows_text(text: str) -> str:
+    return "\ufeff" + text.replace("\n", "\r\n")
+
+
+def spaced(text: str) -> str:
+    return "\n" + text.replace("\n", "\n\n  \n")
+
+
+def repeated(text: str) -> str:
+    first, _, rest = text.partition("\n")
+    return text if "#" in text else f"{first}\n{first}\n{rest}"
+
+
+@pytest.mark.parametrize("change", [windows_text, spaced, repeated])
+def test_files_that_other_programs_wrote_are_read_alike(
+    change: Callable[[str], str], data: PreparedData, published: Path, tmp_path: Path
+) -> None:
+    for file in (*published.glob("*.txt"), *published.glob("texts/*.txt")):
+        file.write_bytes(change(file.read_text()).encode())
+    prepare_t2m(HUMANML3D_SET, published, tmp_path / "out")
+    assert PreparedData.open(tmp_path / "out").clips == data.clips
+
+
+def test_a_caption_keeps_its_line_whatever_signs_it_holds(published: Path, tmp_path: Path) -> None:
+    say("someone\u2028 waves\x85and\x0b bows##0#0")(published)
+    prepare_t2m(HUMANML3D_SET, published, tmp_path / "out")
+    clips = {clip.id: clip for clip in PreparedData.open(tmp_path / "out").clips}
+    assert clips["000002"].captions == ("someone waves and bows",)
 
 
 def say(line: str) -> Callable[[Path], object]:
@@ -164,7 +214,7 @@ def test_captions_are_read_from_the_right() -> None:
 @pytest.mark.parametrize(
     ("spoil", "message"),
     [
-        (nan, "NaN"),
+        (spoil("000001", "M000001", "000003"), "3 of 8 clips cannot be read"),
         (lambda folder: np.save(folder / "new_joint_vecs" / "000001.npy", np.zeros((50, 251), np.float32)), "263"),
         (lambda folder: np.save(folder / "Std.npy", -np.ones(263, np.float32)), "negative deviation"),
         (lambda folder: (folder / "val.txt").write_text("000001"), "000001 is in train already"),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +11,7 @@ from numpy.typing import NDArray
 
 from marey.core.arrays import check_array, read_npy
 from marey.core.documents import read_bytes
-from marey.core.errors import InvalidFile
+from marey.core.errors import InvalidFile, NotFound
 from marey.data.folder import LEAST_STD
 from marey.data.manifest import Measured
 from marey.motion.features import FeatureLayout
@@ -19,10 +21,52 @@ Float32 = NDArray[np.float32]
 SPLITS = ("train", "val", "test")
 MAX_TEXT = 2**28
 """Largest size of a text file in bytes."""
+UNREADABLE, FEW = 0.01, 2
+"""Listed clips that may have no file or one with NaN: a share, or a clip and its mirror image. HumanML3D's own scripts
+leave out two of 29,232."""
+
+
+@dataclass
+class LeftOut:
+    """Listed clips that are not used.
+
+    Attributes:
+        reasons: why, by clip.
+        missing: those that have no file.
+        spoiled: those with a file that holds NaN or infinite numbers.
+    """
+
+    reasons: dict[str, str] = field(default_factory=dict[str, str])
+    missing: list[str] = field(default_factory=list[str])
+    spoiled: list[str] = field(default_factory=list[str])
+
+    def miss(self, name: str, file: str) -> None:
+        """Leave out a clip without one of its files."""
+        self.missing.append(name)
+        self.reasons[name] = f"there is no {file}"
+
+    def spoil(self, name: str, file: str) -> None:
+        """Leave out a clip whose features are no numbers."""
+        self.spoiled.append(name)
+        self.reasons[name] = f"{file} holds NaN or infinite numbers"
+
+    def check(self, listed: int, *, where: Path, hint: str) -> None:
+        """Check that few of the listed clips are unreadable.
+
+        Raises:
+            NotFound, InvalidFile: too many have no file, or hold NaN.
+        """
+        unreadable = [*self.missing, *self.spoiled]
+        if len(unreadable) <= max(FEW, UNREADABLE * listed):
+            return
+        error = NotFound if self.missing else InvalidFile
+        message = f"{self.reasons[unreadable[0]]}; {len(unreadable)} of {listed} clips cannot be read"
+        raise error(message, where=str(where), hint=hint)
 
 
 def read_lines(path: Path) -> list[str]:
-    """Return the lines of a text file, without spaces around them.
+    """Return the lines of a text file, without spaces around them and without the mark with which some editors begin
+    a file. Signs that only some programs take for the end of a line, such as U+2028, do not end one.
 
     Raises:
         NotFound: there is no such file.
@@ -30,9 +74,10 @@ def read_lines(path: Path) -> list[str]:
         TooLarge: it is larger than `MAX_TEXT`.
     """
     try:
-        return [line.strip() for line in read_bytes(path, limit=MAX_TEXT).decode("utf-8").splitlines()]
+        text = read_bytes(path, limit=MAX_TEXT).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InvalidFile(f"is not UTF-8: {error.reason}", where=str(path)) from None
+    return [line.strip() for line in io.StringIO(text, newline=None)]
 
 
 def read_statistics(mean: Path, std: Path, width: int) -> tuple[Float32, Float32]:

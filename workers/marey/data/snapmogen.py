@@ -4,7 +4,8 @@ folder.
 The published folder holds `renamed_feats/{mid}.npy` (the unpacked renamed_feats.zip), `all_caption_clean.json`,
 `meta_data/{mean,std}.npy` and `data_split_info/{train,val,test}_ids.txt`. A clip is `mid#start#end`: frames of one
 feature file. A mid with `m_` before it is the mirror image. Features and statistics are taken over as they are, since
-the published networks were trained on them.
+the published networks were trained on them. Clips without a feature file, or with NaN in theirs, are left out if they
+are few.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from marey.core.errors import InvalidFile, NotFound
 from marey.data.folder import PreparedWriter
 from marey.data.licences import Terms
 from marey.data.manifest import Clip, Manifest, Measured, SourceEntry
-from marey.data.published import MAX_TEXT, SPLITS, read_lines, read_statistics
+from marey.data.published import MAX_TEXT, SPLITS, LeftOut, read_lines, read_statistics
 from marey.data.published import measure as measure_travel
 from marey.data.sampling import UNLABELLED
 from marey.data.wording import mirrored
@@ -84,7 +85,7 @@ class PublishedFolder:
 
         Raises:
             NotFound: a split file or the captions are missing.
-            InvalidFile: a line that is not a clip, a clip twice, or a clip without captions.
+            InvalidFile: a line that is not a clip, a clip in two splits, or a clip without captions.
         """
         seen: dict[str, str] = {}
         for split in SPLITS:
@@ -94,6 +95,8 @@ class PublishedFolder:
                 if not name:
                     continue
                 if name in seen:
+                    if seen[name] == split:
+                        continue
                     raise InvalidFile(f"the clip {name} is in {seen[name]} already", where=where)
                 seen[name] = split
                 yield self._clip(name, split, where)
@@ -125,25 +128,27 @@ class PublishedFolder:
             raise InvalidFile("is not a JSON object of clips", where=str(path))
         return {str(name): _captions_in(entry, f"{path}: {name}") for name, entry in document.items()}
 
-    def features(self, clip: PublishedClip) -> Float32:
-        """Return the features (T, 296) of a clip.
+    def features(self, clip: PublishedClip, left_out: LeftOut) -> Float32 | None:
+        """Return the features (T, 296) of a clip; None, with the reason in `left_out`, without a file or with NaN.
 
         Raises:
-            NotFound: its file is missing.
-            InvalidFile: its file has another width, holds NaN, or ends before the clip does.
+            InvalidFile: its file has another width, or ends before the clip does.
         """
         path = self.path / FEATURES / f"{clip.mid}.npy"
         try:
             every = map_npy(path)
         except NotFound:
-            hint = f"Unpack renamed_feats.zip, so that its files lie in {FEATURES}/."
-            raise NotFound("there is no such feature file", where=str(path), hint=hint) from None
+            left_out.miss(clip.id, f"{FEATURES}/{clip.mid}.npy")
+            return None
         check_array(every, path.name, str(path), kinds="f", shape=(None, LAYOUT.dim), finite=False)
         if clip.end > len(every):
             message = f"the clip {clip.id} ends at frame {clip.end}, the file holds {len(every)}"
             raise InvalidFile(message, where=str(path))
         frames = every[clip.start : clip.end].astype(np.float32)
-        return check_array(frames, clip.id, str(path), kinds="f", shape=(len(frames), LAYOUT.dim))
+        if not np.isfinite(frames).all():
+            left_out.spoil(clip.id, f"{FEATURES}/{clip.mid}.npy")
+            return None
+        return frames
 
     def statistics(self) -> tuple[Float32, Float32]:
         """Return the published mean and deviation (296,); raises as `read_statistics`."""
@@ -182,13 +187,16 @@ def prepare_snapmogen(path: Path, out: Path, *, progress: Progress | None = None
     """
     published = PublishedFolder(path)
     statistics = published.statistics()
-    clips = list(published.clips())
+    clips, left_out = list(published.clips()), LeftOut()
     with PreparedWriter(out, LAYOUT) as writer:
         for done, clip in enumerate(clips, start=1):
-            features = published.features(clip)
-            writer.append(features, joints_of(features), _described(clip, features, writer))
+            features = published.features(clip, left_out)
+            if features is not None:
+                writer.append(features, joints_of(features), _described(clip, features, writer))
             if progress:
                 progress(done, len(clips))
+        hint = f"Unpack renamed_feats.zip, so that its files lie in {FEATURES}/."
+        left_out.check(len(clips), where=path, hint=hint)
         writer.check_split()
         writer.close_arrays()
         captured = sum(not clip.mirrored for clip in writer.clips)
@@ -197,7 +205,7 @@ def prepare_snapmogen(path: Path, out: Path, *, progress: Progress | None = None
             sources=(SourceEntry(**vars(TERMS), clips=captured),),
             tier=TERMS.tier,
             facing_sigma=LAYOUT.facing_sigma,
-            left_out={},
+            left_out=left_out.reasons,
             compositional_pairs=(),
         )
         return writer.complete(statistics, manifest)

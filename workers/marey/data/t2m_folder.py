@@ -10,7 +10,7 @@ All three have the layout of HumanML3D (Guo et al. 2022):
 
 Features and statistics are taken over as they are. What is used is what the public loader uses (momask-codes,
 data/t2m_dataset.py): clips of `shortest` to 199 frames; a caption with times of its own is a clip of its own, if that
-piece is long enough; names without a feature file are left out.
+piece is long enough; names without a feature file, or with one that holds NaN, are left out if they are few.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from marey.core.errors import InvalidFile, NotFound
 from marey.data.folder import PreparedWriter
 from marey.data.licences import Terms
 from marey.data.manifest import Clip, Manifest, SourceEntry
-from marey.data.published import SPLITS, measure, read_lines, read_statistics
+from marey.data.published import SPLITS, LeftOut, measure, read_lines, read_statistics
 from marey.data.sampling import UNLABELLED
 from marey.data.t2m_captions import TaggedCaption, read_caption
 from marey.motion.features import HUMANML3D_263, KIT_251, HeadingLayout, to_world
@@ -40,8 +40,6 @@ MEAN, STD = "Mean.npy", "Std.npy"
 LONGEST = 199
 """Frames of the longest clip that is used."""
 MIRROR = "M"
-MISSING = 0.01
-"""Share of the listed clips that may have no file: HumanML3D's own scripts leave out two of 29,232."""
 
 
 @dataclass(frozen=True)
@@ -106,19 +104,17 @@ class T2MFolder:
         path: the folder.
         kind: the set that it holds.
         left_out: clips that are not used, each with the reason; filled while clips are read.
-        missing: those of them that have no file.
     """
 
     path: Path
     kind: T2MSet
-    left_out: dict[str, str] = field(default_factory=dict[str, str])
-    missing: list[str] = field(default_factory=list[str])
+    left_out: LeftOut = field(default_factory=LeftOut)
 
     def names(self) -> dict[str, str]:
         """Return the split of each listed name.
 
         Raises:
-            NotFound, InvalidFile, TooLarge: a split file is missing or not text, or a name is listed twice or is none.
+            NotFound, InvalidFile, TooLarge: a split file is missing or not text, or a name is in two splits or is none.
         """
         found: dict[str, str] = {}
         for split in SPLITS:
@@ -129,16 +125,15 @@ class T2MFolder:
                     continue
                 if Path(name).name != name:
                     raise InvalidFile(f"{name[:60]!r} is not the name of a clip", where=where)
-                if name in found:
+                if found.setdefault(name, split) != split:
                     raise InvalidFile(f"the clip {name} is in {found[name]} already", where=where)
-                found[name] = split
         return found
 
     def pieces(self, name: str) -> Iterator[tuple[str, Float32, tuple[TaggedCaption, ...]]]:
         """Yield the clips that a listed name gives: id, features (T, D) and captions. The first is the whole clip.
 
         Raises:
-            InvalidFile: features of another width or with NaN, or a line that is no caption.
+            InvalidFile: features of another width, or a line that is no caption.
         """
         features = self._features(name)
         if features is None:
@@ -156,7 +151,7 @@ class T2MFolder:
         if whole:
             yield name, features, tuple(whole)
         elif not cropped:
-            self.left_out.setdefault(name, "it has no caption")
+            self.left_out.reasons.setdefault(name, "it has no caption")
         yield from cropped
 
     def _features(self, name: str) -> Float32 | None:
@@ -164,9 +159,12 @@ class T2MFolder:
         try:
             values = read_npy(path)
         except NotFound:
-            self._miss(name, f"{FEATURES}/{name}.npy")
+            self.left_out.miss(name, f"{FEATURES}/{name}.npy")
             return None
-        wide = check_array(values, path.name, str(path), kinds="f", shape=(None, self.kind.layout.dim))
+        wide = check_array(values, path.name, str(path), kinds="f", shape=(None, self.kind.layout.dim), finite=False)
+        if not np.isfinite(wide).all():
+            self.left_out.spoil(name, f"{FEATURES}/{name}.npy")
+            return None
         return wide.astype(np.float32) if self._fits(name, wide) else None
 
     def _captions(self, name: str) -> Iterator[TaggedCaption]:
@@ -174,7 +172,7 @@ class T2MFolder:
         try:
             lines = read_lines(path)
         except NotFound:
-            self._miss(name, f"{TEXTS}/{name}.txt")
+            self.left_out.miss(name, f"{TEXTS}/{name}.txt")
             return
         for number, line in enumerate(lines, start=1):
             if line:
@@ -183,21 +181,8 @@ class T2MFolder:
     def _fits(self, name: str, features: NDArray[np.floating]) -> bool:
         fits = self.kind.shortest <= len(features) <= LONGEST
         if not fits:
-            self.left_out[name] = f"it is not {self.kind.shortest} to {LONGEST} frames long"
+            self.left_out.reasons[name] = f"it is not {self.kind.shortest} to {LONGEST} frames long"
         return fits
-
-    def _miss(self, name: str, file: str) -> None:
-        self.missing.append(name)
-        self.left_out[name] = f"there is no {file}"
-
-    def check_missing(self, listed: int) -> None:
-        """Raise NotFound if too many of the listed clips have no file."""
-        if len(self.missing) > MISSING * listed:
-            raise NotFound(
-                f"{self.left_out[self.missing[0]]}; {len(self.missing)} of {listed} clips have no file",
-                where=str(self.path),
-                hint=f"The folder holds {FEATURES}, {TEXTS}, {MEAN}, {STD} and the names of the splits.",
-            )
 
 
 def _unused(name: str, known: list[str]) -> str:
@@ -232,7 +217,8 @@ def prepare_t2m(kind: T2MSet, path: Path, out: Path, *, progress: Progress | Non
                 writer.append(features, joints, clip)
             if progress:
                 progress(done, len(names))
-        published.check_missing(len(names))
+        hint = f"The folder holds {FEATURES}, {TEXTS}, {MEAN}, {STD} and the names of the splits."
+        published.left_out.check(len(names), where=path, hint=hint)
         writer.check_split()
         writer.close_arrays()
         captured = sum(not (clip.mirrored or clip.cropped) for clip in writer.clips)
@@ -241,7 +227,7 @@ def prepare_t2m(kind: T2MSet, path: Path, out: Path, *, progress: Progress | Non
             sources=(SourceEntry(**vars(kind.terms), clips=captured),),
             tier=kind.terms.tier,
             facing_sigma=kind.layout.facing_sigma,
-            left_out=published.left_out,
+            left_out=published.left_out.reasons,
             compositional_pairs=(),
         )
         return writer.complete(statistics, manifest)

@@ -62,8 +62,9 @@ class AblationRequest:
 
 
 def judge(generator: Generator[S], texts: Sequence[TextFeatures], settings: S) -> dict[str, float]:
-    """Measure prompt adherence, foot skate and jerk of one bundle."""
-    report = measure(generator, texts, evaluation_prompts(), seeds=[0], settings=settings)
+    """Measure prompt adherence, foot skate and jerk of what the network of one bundle makes, without drawn movements:
+    those are the same in every row."""
+    report = measure(generator, texts, evaluation_prompts(), seeds=[0], settings=settings, drawing=False)
     physical = mean_quality(t.quality for t in report.trials)
     rates = {name: rate.share for name, rate in report.summary.items()}
     return rates | {"foot skate": physical.skate, "jerk": physical.jerk}

@@ -130,6 +130,7 @@ def measure(
     seeds: Iterable[int],
     settings: S,
     frames: int | None = None,
+    drawing: bool = True,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> AdherenceReport:
     """Generate every prompt with every seed and judge it.
@@ -141,9 +142,10 @@ def measure(
         seeds: seeds, one motion per prompt and seed.
         settings: sampling settings.
         frames: length of every motion; None = the length estimator's.
+        drawing: rules may draw movements where the settings let them; else the network makes all.
         progress: called with motions done and wanted.
     """
-    drawing = drawing_of(generator, settings)
+    drawing = drawing and drawing_of(generator, settings)
     jobs = [
         (prompt, Request(text, seed, frames, drawing=drawing))
         for seed in seeds

@@ -52,6 +52,13 @@ def save_checkpoint(
     shutil.rmtree(old, ignore_errors=True)
 
 
+def restore_previous(folder: Path) -> None:
+    """Bring back the previous checkpoint where a run was killed while it replaced it; one process does so for all."""
+    old = folder.with_name(f".{folder.name}.old")
+    if not (folder / "state.json").is_file() and (old / "state.json").is_file():
+        old.rename(folder)
+
+
 def read_state(folder: Path) -> TrainingState:
     """Read the JSON half of a checkpoint.
 
@@ -61,11 +68,7 @@ def read_state(folder: Path) -> TrainingState:
     """
     file = folder / "state.json"
     if not file.is_file():
-        old = folder.with_name(f".{folder.name}.old")
-        if (old / "state.json").is_file():  # killed between the two renames
-            old.rename(folder)
-        else:
-            raise NotFound("there is no checkpoint", where=str(folder), hint="Start the run without --resume.")
+        raise NotFound("there is no checkpoint", where=str(folder), hint="Start the run without --resume.")
     try:
         state = TrainingState(**read_json(file, allow_nan=True))
     except TypeError as error:

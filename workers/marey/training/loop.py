@@ -29,7 +29,7 @@ from marey.nn import distributed
 from marey.nn.devices import fast_bf16
 from marey.nn.ema import WeightAverage
 from marey.training.budget import Budget, learning_rate
-from marey.training.checkpoint import TrainingState, load_checkpoint, save_checkpoint
+from marey.training.checkpoint import TrainingState, load_checkpoint, restore_previous, save_checkpoint
 from marey.training.cuda_graphs import RecordedSteps, StepResult
 from marey.training.stages import RecordableStage, SplitStage, StepContext, TrainingStage
 
@@ -110,6 +110,9 @@ class _Run:
             InvalidInput: it is of another run.
         """
         stage, seed = self.stage, self.options.seed
+        if self.main:
+            restore_previous(self.checkpoint)
+        distributed.barrier()
         state = load_checkpoint(self.checkpoint, stage.module, self.average, self.optimizer)
         if (state.stage, state.seed, state.config) != (stage.name, seed, self.config):
             raise InvalidInput(

@@ -75,6 +75,7 @@ class TrainOptions(Generic[C]):
     micro_batch: int | Literal["auto"] | None = None  # samples of a pass; auto = as many as fit the device's memory
     recompute: bool = False  # activations in the backward pass: less memory, more time
     record: bool = True  # steps as CUDA graphs, where device and stage allow it
+    checkpoint_minutes: float = 3.0  # minutes between checkpoints
 
     def options(self, stage: str) -> RunOptions:
         """Return the loop's options for a stage."""
@@ -83,7 +84,7 @@ class TrainOptions(Generic[C]):
             raise InvalidInput("auto is for stages whose memory is estimated", where="--micro-batch", hint=hint)
         return RunOptions(
             self.run / stage, self.budget, seed=self.seed, resume=self.resume, bf16=self.bf16, quiet=self.quiet,
-            micro_batch=self.micro_batch, record=self.record,
+            micro_batch=self.micro_batch, record=self.record, checkpoint_minutes=self.checkpoint_minutes,
         )  # fmt: skip
 
 

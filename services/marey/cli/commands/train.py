@@ -81,6 +81,10 @@ Record = Annotated[
     bool,
     typer.Option("--record/--no-record", help="Record steps on a GPU as CUDA graphs: three times as many a second."),
 ]
+Checkpoints = Annotated[
+    float,
+    typer.Option("--checkpoint-minutes", min=0.0, help="Minutes between checkpoints, which --resume goes on from."),
+]
 Bf16 = Annotated[bool, typer.Option("--bf16/--no-bf16", help="Use bfloat16 matrices where they are faster.")]
 
 
@@ -131,6 +135,7 @@ def _stage_command(training: Training, stage: str) -> Callable[..., None]:
         micro_batch: MicroBatch = None,
         recompute: Recompute = False,
         record: Record = True,
+        checkpoint_minutes: Checkpoints = 3.0,
         as_json: console.Json = False,
         **choices: str | None,
     ) -> None:
@@ -140,6 +145,7 @@ def _stage_command(training: Training, stage: str) -> Callable[..., None]:
             training, stage, data, run, config=config, steps=steps, minutes=max_minutes, seed=seed, resume=resume,
             warm=warm, origin=origin, rate=learning_rate, device=device, threads=threads, bf16=bf16,
             choices=_given(choices), micro_batch=_micro_batch(micro_batch), recompute=recompute, record=record,
+            checkpoint_minutes=checkpoint_minutes,
         )  # fmt: skip
         if as_json:
             console.result_json(metrics)
