@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.motion.courses import SWING_S
-from marey.motion.feet import RULE, ContactRule, find_contacts, runs
+from marey.motion.feet import RULE, ContactRule, find_contacts, heights, runs
 from marey.motion.rotations import Array, normalize
-from marey.motion.skeleton import OTHER_FOOT, Skeleton
+from marey.motion.skeleton import Skeleton
 
 Bool = NDArray[np.bool_]
 
@@ -42,7 +42,7 @@ def carrying_contacts(joints: Array, skeleton: Skeleton, fps: float, *, rule: Co
         fps: frames a second.
         rule: thresholds in metres and seconds.
     """
-    stands, height = find_contacts(joints, skeleton, fps, rule=rule), _heights(joints, skeleton)
+    stands, height = find_contacts(joints, skeleton, fps, rule=rule), heights(joints, skeleton)
     toes, speed = (
         joints[:, list(skeleton.feet[1::2])][..., [0, 2]],
         _carrying_speed(joints, stands, height, skeleton, fps),
@@ -60,13 +60,6 @@ def carrying_contacts(joints: Array, skeleton: Skeleton, fps: float, *, rule: Co
             speed[grown[0] : grown[1] - 1, side] = np.inf
         speed[step, side] = np.inf
     return stands
-
-
-def _heights(joints: Array, skeleton: Skeleton) -> Array:
-    """Return metres (T, 4) of the joints of the feet over their standing height, the lower one of both sides."""
-    height = joints[:, list(skeleton.feet), 1]
-    ground = np.quantile(height, 0.1, axis=0)
-    return height - np.minimum(ground, ground[OTHER_FOOT])
 
 
 def _carrying_speed(joints: Array, stands: Bool, height: Array, skeleton: Skeleton, fps: float) -> Array:

@@ -148,6 +148,13 @@ def find_contacts(joints: Array, skeleton: Skeleton, fps: float, *, rule: Contac
     return stands
 
 
+def heights(joints: Array, skeleton: Skeleton) -> Array:
+    """Return metres (T, 4) of the joints of the feet over their standing height, the lower one of both sides."""
+    height = joints[:, list(skeleton.feet), 1]
+    ground = np.quantile(height, 0.1, axis=0)
+    return height - np.minimum(ground, ground[OTHER_FOOT])
+
+
 def _over_floor(joints: Array, skeleton: Skeleton, rule: ContactRule) -> Bool:
     """Return the frames (T, 4) in which the foot of each joint can stand on a floor at y = 0: one that is held still
     above it does not."""

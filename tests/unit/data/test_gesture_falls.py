@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 import re
 from collections import Counter
 
@@ -11,14 +12,18 @@ import pytest
 from marey.data import gestures
 from marey.data.gestures import made_gestures
 from marey.data.part import MAX_FRAMES, Part
+from marey.drawing.cartwheels import cartwheel
 from marey.drawing.tumbling import Limb, Tumble, Whole, centre_of_mass, flipped, stood
+from marey.motion.pose import solve_pose
 from marey.motion.skeleton import HUMANML3D
 from marey.posing.standing import StandingBody
+from marey.posing.still import standing_still
 from tests.support.bodies import FPS
 from tests.unit.data.test_gestures import FALLS, OTHER, few, idle, tilt
 
 COUNT = 24
 HEAD, CHEST, TOES = 15, 9, [10, 11]
+ARMS = [16, 17, 18, 19]
 
 
 @pytest.fixture(scope="module")
@@ -137,6 +142,28 @@ def test_a_swimmer_lies_level_or_leans_and_strokes_off_the_floor(made: list[Part
             place = part.joints[:, ends] - part.joints[:, :1]
             path = np.linalg.norm(np.diff(place, axis=0), axis=-1).sum(0)
             assert path.min() > 0.4 * len(part.joints) / FPS  # metres a second
+
+
+def fastest_turn(joints: np.ndarray) -> float:
+    """Degrees by which an upper arm or a forearm turns from its parent from one frame to the next at most."""
+    rotations = solve_pose(joints.astype(np.float64), HUMANML3D, fps=FPS, measure=False).rotations
+    same = np.abs((rotations[1:, ARMS] * rotations[:-1, ARMS]).sum(-1))
+    return float(np.degrees(2 * np.arccos(np.clip(same, 0.0, 1.0))).max())
+
+
+def test_arms_of_a_flip_swing_ahead_and_do_not_fold(made: list[Part]) -> None:
+    turns = [fastest_turn(part.joints) for part in of(made, "flip")]
+    assert np.median(turns) < 45.0
+    assert max(turns) < 80.0
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_arms_of_a_cartwheel_turn_evenly(seed: int) -> None:
+    rng = random.Random(seed)
+    gesture = cartwheel(rng, times=2)
+    body = StandingBody(standing_still(round(gesture.seconds * FPS), rng))
+    gesture.change(body)
+    assert fastest_turn(body.joints) < 80.0
 
 
 def test_a_flip_turns_over_in_the_air_and_lands_on_the_feet(made: list[Part]) -> None:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
-from marey.generation.ends import STILL_M, ended
+from marey.generation.ends import STEP_S, STILL_M, ended
 from marey.generation.flights import UP_M, lowest_foot
 from marey.motion.features import HUMANML3D_263
-from tests.support.bodies import Body
+from tests.support.bodies import Body, runner, walker
 from tests.unit.generating.test_flights import jumper
 
 LAYOUT = HUMANML3D_263
@@ -50,3 +52,23 @@ def test_others_stay_as_long_as_they_are(rises: float, action: str) -> None:
 def test_no_more_than_its_end_is_left_out() -> None:
     features = LAYOUT.encode(jumper(0.3, 3.0, before_s=1.0, after_s=0.0))
     assert ended(features, LAYOUT, "jump") is None
+
+
+@pytest.mark.parametrize("count", range(64, 80, 3))
+@pytest.mark.parametrize(("action", "body"), [("walk", walker), ("run", runner)])
+def test_ways_end_on_a_settled_step(action: str, body: Callable[..., np.ndarray], count: int) -> None:
+    features = LAYOUT.encode(body(4.0))[:count]
+    ends = ended(features, LAYOUT, action)
+    kept = features if ends is None else ends
+    assert len(features) - len(kept) <= STEP_S * FPS
+    np.testing.assert_array_equal(kept, features[: len(kept)])
+    toes = LAYOUT.decode(kept)[-1, [10, 11], 1]
+    assert (toes.max() if action == "walk" else toes.min()) < 0.05
+
+
+def test_ways_that_end_in_mid_stride_are_shorter_and_no_others() -> None:
+    features = LAYOUT.encode(walker(4.0))
+    ends = [ended(features[:count], LAYOUT, "walk") for count in range(60, 80)]
+    assert any(each is None for each in ends)
+    assert any(each is not None for each in ends)
+    assert all(ended(features[:count], LAYOUT, "dance") is None for count in range(60, 80))

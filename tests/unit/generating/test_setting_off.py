@@ -7,8 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from marey.generation.distances import distance_of
 from marey.generation.port import Limits
-from marey.generation.shots.setting_off import CHANGES, Beside, end_speeds, set_off, setting_off, with_even_speed
+from marey.generation.shots.setting_off import (
+    CHANGES,
+    Beside,
+    end_speeds,
+    set_off,
+    setting_off,
+    setting_off_as_far,
+    with_even_speed,
+)
 from marey.generation.shots.strands import Fate, RowStrand
 from marey.generation.shots.timeline_plan import TimelinePart
 from marey.generation.shots.windows import no_text
@@ -58,12 +67,30 @@ def test_stated_times_stay(is_open: bool, fixed: bool) -> None:
     assert (len(made) == len(RUN)) is (fixed or not is_open)
 
 
-def test_stated_metres_stay() -> None:
-    features = LAYOUT.encode(Body(6.0, speed=lambda t: 3.0 * np.clip((t - 2.0) / 0.2, 0, 1)).joints())
-    rows = [row("a person waves", features[:40]), row("a person runs 10 meters", features[40:])]
-    assert with_even_speed(features, LAYOUT, rows, [TimelinePart(40, 48, 1)]) is features
-    set_off(rows, LAYOUT, fixed=False)
-    assert len(rows[1].features if rows[1].features is not None else ()) == len(features) - 40
+def test_a_run_of_stated_metres_sets_off_slowly_and_goes_so_far() -> None:
+    off = setting_off_as_far(RUN, LAYOUT, Beside(0.0, 0.0, 8), 16.0)
+    assert off is not None
+    assert distance_of(off, LAYOUT) == pytest.approx(16.0, rel=0.03)
+    assert max(end_speeds(off, LAYOUT)) < 2.8
+    assert np.abs(np.diff(course_of(off, LAYOUT).speeds(FPS))).max() * FPS < 6.0
+    assert setting_off_as_far(RUN, LAYOUT, Beside(None, None, 8), 16.0) is None
+
+
+@pytest.mark.parametrize(
+    ("said", "fixed", "longer"),
+    [
+        ("a person runs 16 meters", False, True),
+        ("a person runs 16 meters", True, False),
+        ("a person runs 16 meters in a circle", False, False),
+    ],
+)
+def test_a_way_of_stated_metres_takes_longer_where_it_may(said: str, fixed: bool, longer: bool) -> None:
+    stand = LAYOUT.encode(Body(2.0, speed=steady(0.0)).joints())
+    rows = [row("a person waves", stand), row(said, RUN), row("a person nods", stand)]
+    set_off(rows, LAYOUT, fixed=fixed)
+    made = rows[1].features
+    assert made is not None
+    assert (len(made) > len(RUN) + 10) is longer
 
 
 def test_a_body_is_not_thrown_forward() -> None:
@@ -75,3 +102,5 @@ def test_a_body_is_not_thrown_forward() -> None:
     gains = [float(np.abs(np.diff(course_of(each, LAYOUT).speeds(FPS))).max() * FPS) for each in (features, even)]
     assert gains[1] < CHANGES[-1]
     assert gains[1] < 0.85 * gains[0]
+    rows[1] = row("a person runs 10 meters", features[40:])
+    assert with_even_speed(features, LAYOUT, rows, [TimelinePart(40, 48, 1)]) is features

@@ -185,7 +185,8 @@ def flip(rng: random.Random, form: str = "", *, stands: bool = False) -> Gesture
     start = steps_in(rng, done, 0.9) if steps else 0.0
     far = rng.uniform(0.9, 1.3) if steps else rng.uniform(0.35, 0.8)
     end, lasts = start + turn * far, rng.uniform(0.62, 0.72)
-    swung = pair(Limb((0.22, -0.34, -0.24), towards=(0.7, 0.1, -0.7)))
+    swung = pair(Limb((0.22, -0.38, -0.14), towards=(0.7, 0.1, -0.7)))
+    passing = pair(Limb((0.24, -0.16, 0.38), towards=(0.8, -0.5, -0.3)))
     raised = pair(Limb((0.2, 0.46, 0.12), towards=(0.8, 0.2, 0.4)))
     low = Whole((0.0, start - 0.06), 0.72, (26, 0, 0), (16, 0, 0), (-10, 0, 0), swung, stood(0, start), splay=0.2)
     toes = {side: Limb((0.0, 0.06, start), OWN) for side in SIDES}
@@ -206,7 +207,12 @@ def flip(rng: random.Random, form: str = "", *, stands: bool = False) -> Gesture
     )
     sunk = replace(landed, height=rng.uniform(0.6, 0.74), tilt=(turn * 360 + 26, 0, 0), spine=(20, 0, 0))
     done.then(0.22 if steps else rng.uniform(0.4, 0.6), low)
-    done.then(rng.uniform(0.22, 0.28), off)
+    springs = rng.uniform(0.26, 0.32)
+    rising = Whole(
+        (0.0, start + 0.02 * turn), 0.9, (20, 0, 0), (6, 0, 0), (-8, 0, 0), passing, stood(0, start), splay=0.15
+    )
+    done.then(0.5 * springs, rising)
+    done.then(0.5 * springs, off)
     _turn_over(done, (start, end), lasts, landed, tight)
     done.then(rng.uniform(0.16, 0.24), sunk)
     done.then(

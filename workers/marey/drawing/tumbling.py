@@ -34,6 +34,8 @@ _REACH, _LEAST = 0.985, 0.17  # share of the length of an arm; metres from shoul
 _PARTS = 6  # parts of the way to a pose that is fallen into
 _SMOOTH = 0.9  # frames
 _TURN = np.radians(28.0)  # by which a foot turns from one frame to the next at most
+_SWING = np.radians(32.0)  # by which a hand turns about its shoulder from one frame to the next at most
+_PASSES = 4  # frames before and after a moment in which a hand passes its shoulder
 _MASSES = {0: 0.16, 3: 0.1, 6: 0.1, 9: 0.16, 15: 0.08, 18: 0.03, 19: 0.03, 20: 0.02, 21: 0.02}
 _LEG_MASSES = {1: 0.05, 2: 0.05, 4: 0.06, 5: 0.06, 7: 0.04, 8: 0.04}
 """Shares of the mass of a body at its joints."""
@@ -320,16 +322,35 @@ def _solve_arm(joints: Array, side: str, motion: WholeMotion, frames: tuple[Arra
             pointed = joints[:, elbow] - 0.5 * (joints[:, shoulder] + joints[:, wrist])
         target += share * point
         pole += share * normalize(pointed)
-    reach = target - joints[:, shoulder]
-    distance = np.linalg.norm(reach, axis=-1, keepdims=True)
     longest = _REACH * (BONE_LENGTHS[elbow] + BONE_LENGTHS[wrist])
-    wrists = joints[:, shoulder] + reach * np.clip(distance, _LEAST, longest) / distance
+    planted = motion.hands[side][FLOOR][0] if FLOOR in motion.hands[side] else np.zeros((len(joints), 1))
+    wrists = joints[:, shoulder] + _swung(target - joints[:, shoulder], planted, longest)
     wrists[:, 1] = np.maximum(wrists[:, 1], _WRIST)
     lengths = (BONE_LENGTHS[elbow], BONE_LENGTHS[wrist])
     for _ in range(2):  # elbows that would be in the floor are lifted
         joints[:, elbow], joints[:, wrist] = two_bones(joints[:, shoulder], wrists, pole, lengths)
         sunk = np.clip((_BEND - joints[:, elbow, 1]) / _BEND, 0.0, 2.0)
         pole = normalize(pole) + blurred(sunk, 2.0)[:, None] * [0.0, 1.0, 0.0]
+
+
+def _swung(reach: Array, planted: Array, longest: float) -> Array:
+    """Return where hands are from their shoulders (T, 3): one that passes its shoulder swings around it, and does not
+    fold the arm on the way.
+
+    Args:
+        reach: (T, 3) where they would be.
+        planted: (T, 1) share in which a hand is on the floor, where it stays.
+        longest: metres of the arm.
+    """
+    distance = np.linalg.norm(reach, axis=-1, keepdims=True)
+    lengths = np.clip(distance, _LEAST, longest)
+    frames = np.pad(lengths[:, 0], 2 * _PASSES, mode="edge")
+    widest = np.lib.stride_tricks.sliding_window_view(frames, 2 * _PASSES + 1).max(axis=1)
+    closed = np.lib.stride_tricks.sliding_window_view(widest, 2 * _PASSES + 1).min(axis=1)
+    lengths += (1.0 - planted) * blurred(closed[:, None] - lengths, _SMOOTH)
+    ways = reach / np.maximum(distance, 1e-6)
+    even = turning_evenly(ways, _SWING)
+    return lengths * normalize(planted * ways + (1.0 - planted) * even)
 
 
 def centre_of_mass(joints: Array) -> Array:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from marey.generation.begun import begun
 from marey.generation.distances import SPEEDS, as_far, distance_of, farther
 from marey.generation.drawn_whole import DrawnWhole, drawn_whole
-from marey.generation.ends import ended
+from marey.generation.ends import SETTLING, ended
 from marey.generation.even_runs import EVEN, even_run
 from marey.generation.fine import FINE, drawn_features
 from marey.generation.flights import DANCES, JUMPS, ON_FEET, fallen, lowered, on_floor
@@ -31,7 +31,7 @@ from marey.generation.postured import GOING_ON, drawn_posture, gone_on, on_postu
 from marey.generation.repetitions import repeated
 from marey.generation.skidding import skidded, skids
 from marey.generation.stated import AT_PACE
-from marey.generation.steered import steered_features
+from marey.generation.steered import CLOSED, steered_features
 from marey.generation.stepped import stepped
 from marey.generation.timed import CUT, cut_of
 from marey.generation.turned import NEAR, ended_turn, turned_features
@@ -342,8 +342,11 @@ def _on_floor(
 
 
 def _ended(features: Float32, layout: FeatureLayout, wish: Wish, fixed: int | None, changes: dict[str, Any]) -> Float32:
-    """Return the motion without the beginning of what would come after its action."""
-    ends = ended(features, layout, wish.action) if fixed is None else None
+    """Return the motion without the beginning of what would come after its action; ways of a number of steps, and those
+    that end where they began, are whole."""
+    closed = wish.course is not None and wish.course.kind in CLOSED
+    whole = wish.action in SETTLING and (wish.count is not None or closed)
+    ends = ended(features, layout, wish.action) if fixed is None and not whole else None
     if ends is None or len(ends) < SHORTEST:
         return features
     changes["left_out"] = round((len(features) - len(ends)) / layout.fps, 2)

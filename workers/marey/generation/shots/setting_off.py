@@ -8,17 +8,21 @@ and last strides are slower and shorter, so that the speed grows and falls evenl
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from marey.generation.distances import NEAR, distance_of, with_distance
+from marey.generation.onward import gone_on_with_strides, steady_part
 from marey.generation.shots.going_on import is_way
 from marey.generation.shots.strands import RowStrand
 from marey.generation.shots.timeline_plan import TimelinePart
+from marey.generation.steered import steered_features
 from marey.generation.timed import cut_of
 from marey.generation.turned import bent_along
+from marey.generation.wish import action_of
 from marey.motion.courses import Course, course_of, natural_course
 from marey.motion.curves import smooth_open
 from marey.motion.features import FeatureLayout, encode_all
@@ -26,6 +30,7 @@ from marey.motion.resample import interpolate
 from marey.motion.rotations import Array
 from marey.quality.limits import assess, expected_by_prompts
 from marey.quality.record import Flag
+from marey.vocabulary.courses import STRAIGHT, WayCourse, stated_course
 
 Float32 = NDArray[np.float32]
 
@@ -33,6 +38,8 @@ ACCELERATES = 4.0
 """Metres a second by which a body is faster or slower after a second."""
 JOINS = 1.5
 """Metres a second by which it may be faster or slower behind a transition than before it."""
+JOINS_FAR = 0.5
+"""The same of ways of stated metres, in whose transitions no step is made shorter (`with_even_speed`)."""
 LEAST = 0.8
 """Metres a second of a difference that is still left to a transition."""
 SLOWER = 0.6
@@ -47,6 +54,8 @@ OWN_S, EASES_S = 0.08, 0.05
 """Standard deviations of the filters of the path that is looked at there, and of the shares of its steps, seconds."""
 LEAST_S = 1.0
 """Seconds of a way that is looked at."""
+TRIES = 3
+"""How often strides are added to a way of stated metres."""
 BESIDE_S = 0.25
 """Seconds at the end of a movement whose speed is that with which it ends."""
 
@@ -58,11 +67,13 @@ class Beside:
     Attributes:
         before, after: how fast they end and begin.
         replaced: frames at the beginning of the way that a transition replaces.
+        joins: metres a second by which the way may be faster than what is beside it.
     """
 
     before: float | None
     after: float | None
     replaced: int
+    joins: float = JOINS
 
 
 def end_speeds(features: Float32, layout: FeatureLayout) -> tuple[float, float]:
@@ -72,8 +83,8 @@ def end_speeds(features: Float32, layout: FeatureLayout) -> tuple[float, float]:
 
 
 def set_off(rows: Sequence[RowStrand], layout: FeatureLayout, *, fixed: bool) -> None:
-    """Let ways set off from the speed of the row before them, and slow down to that of the row behind; not those whose
-    metres are stated.
+    """Let ways set off from the speed of the row before them, and slow down to that of the row behind. A way whose
+    metres are stated has as many strides more as it takes to go so far, where its length is free.
 
     Args:
         rows: of a sequence, in their order.
@@ -81,7 +92,9 @@ def set_off(rows: Sequence[RowStrand], layout: FeatureLayout, *, fixed: bool) ->
         fixed: all rows keep their length.
     """
     for number, row in enumerate(rows):
-        if row.features is None or not _is_made_way(row) or row.as_way(layout).metres is not None:
+        metres = row.as_way(layout).metres
+        keeps = fixed or not row.open
+        if row.features is None or not _is_made_way(row) or (metres is not None and (keeps or _is_bent(row))):
             continue
         before = rows[number - 1] if number and not _goes_on(row) else None
         after = rows[number + 1] if number + 1 < len(rows) and not _goes_on(rows[number + 1]) else None
@@ -90,13 +103,22 @@ def set_off(rows: Sequence[RowStrand], layout: FeatureLayout, *, fixed: bool) ->
             None if after is None or after.features is None else end_speeds(after.features, layout)[0],
             cut_of(len(row.features)),
         )
-        off = setting_off(row.features, layout, beside, len(row.features) if fixed or not row.open else None)
+        if metres is None:
+            off = setting_off(row.features, layout, beside, len(row.features) if keeps else None)
+        else:
+            off = setting_off_as_far(row.features, layout, beside, metres)
         row.features = row.features if off is None else off
 
 
 def _is_made_way(row: RowStrand) -> bool:
     """Return True if a row is a way that the model made."""
     return is_way(row.text) and not row.is_drawn
+
+
+def _is_bent(row: RowStrand) -> bool:
+    """Return True if the words tell a way that is not straight."""
+    course = stated_course(row.text.said, action_of(row.text))
+    return course is not None and course.kind != STRAIGHT
 
 
 def _goes_on(row: RowStrand) -> bool:
@@ -129,11 +151,36 @@ def setting_off(features: Float32, layout: FeatureLayout, beside: Beside, frames
     return encode_all(layout, strides.played(frames))
 
 
+def setting_off_as_far(features: Float32, layout: FeatureLayout, beside: Beside, metres: float) -> Float32 | None:
+    """Return features (T', D) of a way of so many metres whose first and last strides lead from the speed of what is
+    beside it to its own; None if they do, or it cannot go on for what they are shorter.
+
+    Args:
+        features: (T, D), in the layout's own units.
+        layout: of the features.
+        beside: it.
+        metres: that it goes.
+    """
+    beside = replace(beside, joins=JOINS_FAR)
+    off = setting_off(features, layout, beside)
+    steady = steady_part(features, layout)
+    step = distance_of(steady, layout) / len(steady)
+    for _ in range(TRIES):
+        if off is None or distance_of(off, layout) >= (1 - NEAR) * metres:
+            break
+        frames = len(features) + round((metres - distance_of(off, layout)) / max(step, 1e-6))
+        longer = gone_on_with_strides(steady, layout, frames)
+        straight = None if longer is None else steered_features(longer, layout, WayCourse(), 0)
+        longer = longer if straight is None else straight
+        off = None if longer is None else setting_off(longer, layout, beside)
+    return None if off is None else with_distance(off, layout, [(0, len(off), metres)])
+
+
 def with_even_speed(
     features: Float32, layout: FeatureLayout, rows: Sequence[RowStrand], transitions: Sequence[TimelinePart]
 ) -> Float32:
     """Return features (T, D) of a sequence with shorter steps where transitions beside ways throw the body forward or
-    hold it up; not beside one whose metres are stated.
+    hold it up; not beside one whose metres are stated, which set off and slow down by strides of their own.
 
     Args:
         features: in the layout's own units.
@@ -212,10 +259,10 @@ class _Strides:
         speeds = self.natural.speeds(layout.fps)
         self.paces, self.lengths = np.ones((2, len(joints)))
         if beside.before is not None:
-            paces, lengths = _passage(speeds, beside.before, beside.replaced, layout.fps)
+            paces, lengths = _passage(speeds, beside.before, beside.replaced, beside.joins, layout.fps)
             self.paces, self.lengths = np.minimum(self.paces, paces), np.minimum(self.lengths, lengths)
         if beside.after is not None:
-            paces, lengths = _passage(speeds[::-1], beside.after, 0, layout.fps)
+            paces, lengths = _passage(speeds[::-1], beside.after, 0, beside.joins, layout.fps)
             self.paces, self.lengths = np.minimum(self.paces, paces[::-1]), np.minimum(self.lengths, lengths[::-1])
 
     @property
@@ -236,7 +283,7 @@ class _Strides:
         return interpolate(joints, self.times(frames))
 
 
-def _passage(speeds: Array, beside: float, replaced: int, fps: float) -> tuple[Array, Array]:
+def _passage(speeds: Array, beside: float, replaced: int, joins: float, fps: float) -> tuple[Array, Array]:
     """Return the paces and the lengths (T,) of strides at so many metres a second (T,) whose first ones lead out of
     another speed."""
     paces, lengths = np.ones((2, len(speeds)))
@@ -245,7 +292,7 @@ def _passage(speeds: Array, beside: float, replaced: int, fps: float) -> tuple[A
     at, count, played, shares = 0.0, 0, list[float](), list[tuple[float, float]]()
     while at < len(speeds) - 1:
         own = float(np.interp(at, np.arange(len(speeds)), speeds))
-        most = beside + JOINS + ACCELERATES * max(count - replaced, 0) / fps
+        most = beside + joins + ACCELERATES * max(count - replaced, 0) / fps
         if most >= own and count >= replaced:
             break
         share = min(most / max(own, 1e-6), 1.0)
