@@ -7,10 +7,14 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 from marey.text.sequence_reader import ReadMovement
+from marey.vocabulary.bearing_words import stated_bearings
 
 TAKING = frozenset({"pick-up", "reach-up", "carry"})
 """Actions behind which something is in a hand."""
 THROW = "throw"
+SWORD_DRAWN, SWORD_SHEATHED, OF_SWORDS = "sword-drawn", "sword-sheathed", frozenset({"slash", "stab", "block"})
+"""Bearings in which a sword comes into the hand, the right one unless the words say otherwise, and is put away; and
+actions that are done with it."""
 _HAND = re.compile(
     r"\b(?:with|in|into|using|by) (?:(?:his|her|their|its|the|my|your|one's) )?(left|right) (?:hand|arm)\b", re.I
 )
@@ -48,9 +52,14 @@ def with_hand_again(prompt: str) -> str:
 
 def with_held_hand(movements: Iterable[ReadMovement]) -> Iterator[ReadMovement]:
     """Yield movements; who throws what a hand has taken up does so with that hand: "picks up a stone with the left
-    hand, then throws it"."""
-    side = ""
+    hand, then throws it". So does who draws a sword and strikes with it."""
+    side = sword = ""
     for movement in movements:
+        stated = {each.name: each for each in stated_bearings(movement.text)}
+        sword = (stated[SWORD_DRAWN].acts or "right") if SWORD_DRAWN in stated else sword
+        uses = movement.action in OF_SWORDS or (SWORD_SHEATHED in stated and SWORD_DRAWN not in stated)
+        if sword and uses and not _SIDE.search(movement.text):
+            movement = replace(movement, text=f"{movement.text} with the {sword} hand")
         hand = _HAND.search(movement.text)
         if movement.action in TAKING:
             side = hand[1].lower() if hand is not None else ""

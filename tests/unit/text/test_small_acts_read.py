@@ -117,3 +117,20 @@ def test_who_stops_with_hands_on_the_knees_does_not_stop_holding_them_there(read
     (features,) = reading.features(["he jogs to the wall and stops with his hands on his knees"])
     assert [[each.name for each in stated_bearings(one.said)] for one in features.movements] == [[], ["winded"]]
     assert acts("she stops rubbing her arms") == []
+
+
+@pytest.mark.parametrize(
+    ("prompt", "hand"),
+    [
+        ("draws her blade, slashes at the rope, then sheathes it", "right"),
+        ("draws a sword with the left hand, slashes at the rope, then sheathes it", "left"),
+        ("draws a sword from his right hip, slashes at the rope, then sheathes it", "left"),
+    ],
+)
+def test_the_hand_that_draws_a_sword_strikes_with_it_and_sheathes_it(
+    reading: TextPipeline, prompt: str, hand: str
+) -> None:
+    (features,) = reading.features([prompt])
+    _, slash, sheathe = features.movements
+    assert slash.said.endswith(f"with the {hand} hand")
+    assert sheathe.said.endswith(f"with the {hand} hand")
