@@ -1,4 +1,4 @@
-"""Timelines of prompts: adherence of the rows jerk around the boundaries between them, and time for 20 and 60 s.
+"""Timelines of prompts: adherence of rows, jerk around the boundaries between them, time and memory for 20 and 60 s.
 
 Timelines of 5 rows of 2 to 6 s are drawn from development prompts of single actions that the bundle supports. Each row
 is judged by the referee, in the timeline and as a motion of its own. Jerk is that of all joints within half a second of
@@ -21,6 +21,7 @@ import torch
 from numpy.typing import NDArray
 
 from benchmarks.harness import measure, table
+from benchmarks.platform import forget_peak, peak_megabytes
 from marey.bundles import choose_bundle
 from marey.data.prepared import PreparedData
 from marey.generation.port import Request
@@ -156,11 +157,17 @@ def report(name: str, shown: Sequence[bool], jerks: Sequence[tuple[float, float]
 
 
 def time_lengths(generator: Any, texts: Sequence[TextFeatures]) -> None:
-    """Print the seconds of timelines of 20 s and 60 s, of rows of 4 s."""
+    """Print the seconds of timelines of 20 s and 60 s, of rows of 4 s, and the memory that they take."""
 
-    def run(rows: int) -> None:
+    def run(rows: int, count: int = 1) -> None:
         times = [TimelineRow(4.0 * row, 4.0 * row + 4, "-") for row in range(rows)]
-        generate_timelines(generator, [timeline_request(times, [texts[row % ROWS] for row in range(rows)], 0, None)])
+        own = [texts[row % ROWS] for row in range(rows)]
+        generate_timelines(generator, [timeline_request(times, own, seed, None) for seed in range(count)])
 
     timings = measure({"20 s": lambda: run(5), "60 s": lambda: run(15)}, repeats=7, seconds=90)
     print(table("one timeline", timings, baseline="20 s"))
+    for count, rows in ((1, 5), (1, 15), (BATCH, 5), (BATCH, 15)):
+        forget_peak(os.getpid())
+        before = peak_megabytes(os.getpid())
+        run(rows, count)
+        print(f"{count} of {4 * rows} s: {peak_megabytes(os.getpid()) - before:.0f} MB more at the peak", flush=True)

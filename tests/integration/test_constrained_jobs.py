@@ -116,12 +116,14 @@ def test_a_fetched_manifest_is_submitted_again_with_its_constraints(
 def test_an_item_that_cannot_be_made_names_the_field(
     api: LiveApi, marey: Command, loop: Loop, http: httpx2.Client
 ) -> None:
-    tail = {"type": "pose_keyframe", "frame": 20, "joint_rotations": {"tail": [1.0, 0.0, 0.0, 0.0]}}
-    bad, good = made(api, loop, {"timeline": TIMELINE, "constraints": [tail]}, {"timeline": TIMELINE}, name="late")
+    low = {"type": "effector_target", "joint": "pelvis", "frames": [20], "positions": [[0.0, 0.5, 0.0]]}
+    stand = {"type": "pose_keyframe", "frame": 20, "joint_rotations": [[1.0, 0.0, 0.0, 0.0]] * 22}
+    asked = {"timeline": TIMELINE, "constraints": [stand, low]}
+    bad, good = made(api, loop, asked, {"timeline": TIMELINE}, name="late")
     assert (bad["state"], good["state"]) == ("failed", "succeeded")
-    assert bad["error"]["where"].startswith("constraints.0.joint_rotations")
+    assert bad["error"]["where"] == "constraints.1.positions.0"
     shown = marey("jobs", "show", "late").ok().out
-    assert f":0.0 {TIMELINE!r}: constraints.0.joint_rotations" in shown
+    assert f":0.0 {TIMELINE!r}: constraints.1.positions.0: is " in shown
     watched = marey("jobs", "watch", "late")
     assert watched.code == 6
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, cast
 
@@ -89,12 +89,13 @@ def check_constraints(bundle: Bundle, item: Item) -> None:
     the terms of their poses against those of the bundle.
 
     Raises:
-        InvalidInput: one is beyond the motion, two contradict each other there, or no licence satisfies the terms of
-            both; with the field in `where`.
+        InvalidInput: one is beyond the motion, two contradict each other there, a pose is of another skeleton, or no
+            licence satisfies the terms of both; with the field in `where`.
     """
     if item.constraints is None:
         return
     terms_with(bundle.manifest.licence, item.constraints)
+    _check_poses(bundle, item.constraints)
     model_fps = bundle.manifest.fps or DEFAULT_FPS
     fps, seconds = item.settings.get("fps", model_fps), length_of(bundle, item)
     if seconds is not None:
@@ -105,6 +106,19 @@ def check_constraints(bundle: Bundle, item: Item) -> None:
         frames = least if last_frame(item.constraints, fps, kind=ROOT_PATH) is not None else None
     if frames is not None:
         for_clip(item.constraints, frames, model_fps, fps)
+
+
+def _check_poses(bundle: Bundle, constraints: Sequence[Mapping[str, Any]]) -> None:
+    """Check that poses are of the skeleton of a bundle; those of motions that are still named are read later."""
+    posed = [number for number, each in enumerate(constraints) if "joint_rotations" in each]
+    if not posed or bundle.manifest.layout is None:
+        return
+    from marey.bundles.body import body_of  # numpy is loaded with the first pose
+    from marey.motion.keyframes import ordered_rotations
+
+    skeleton = body_of(bundle.manifest).skeleton
+    for number in posed:
+        ordered_rotations(constraints[number]["joint_rotations"], skeleton, f"constraints.{number}.joint_rotations")
 
 
 def length_of(bundle: Bundle, item: Item) -> float | None:

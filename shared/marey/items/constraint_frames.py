@@ -12,6 +12,7 @@ from typing import Any
 
 from marey.core.errors import InvalidInput
 from marey.core.frame_rates import frames_at_rate
+from marey.items.constraint_bodies import check_bodies
 from marey.items.constraints import EFFECTOR_TARGET, FASTEST, ROOT_PATH
 
 NEAR_PATH = 0.25
@@ -107,6 +108,7 @@ def check_clip(constraints: Sequence[Mapping[str, Any]], frames: int, fps: float
                     hint=f"Its last frame is at {(frames - 1) / fps:g} s: end there, or ask for a longer clip.",
                 )
     _check_paths(constraints, fps)
+    check_bodies(constraints, fps)
 
 
 def _check_paths(constraints: Sequence[Mapping[str, Any]], fps: float) -> None:
@@ -135,13 +137,14 @@ def _check_paths(constraints: Sequence[Mapping[str, Any]], fps: float) -> None:
 def _check_reach(
     target: Mapping[str, Any], points: Sequence[tuple[float, tuple[float, float], str]], where: str
 ) -> None:
-    """Check that a body on the path reaches a target."""
+    """Check that a body on the path reaches a target; the pelvis is the root, and lies on it."""
+    most = NEAR_PATH if target["joint"] == "pelvis" else FARTHEST
     for number, (frame, place) in enumerate(zip(target["frames"], target["positions"], strict=True)):
         there = _path_at(points, frame)
         far = 0.0 if there is None else math.dist(there, (place[0], place[2]))
-        if far > FARTHEST:
+        if far > most:
             raise InvalidInput(
-                f"is out of reach: {far:.2f} m from the root path at frame {frame}; at most {FARTHEST:g} m",
+                f"is out of reach: {far:.2f} m from the root path at frame {frame}; at most {most:g} m",
                 where=f"{where}.positions.{number}",
             )
 

@@ -105,6 +105,8 @@ def test_what_the_text_stage_reads(api: LiveApi, http: httpx2.Client, generator:
         ([{"op": "repaint", "to": 1, "prompt": " "}], {}, "ops.0.prompt", "is not a sentence"),
         ([{"op": "repaint", "to": 1, "seed": -1}], {}, "ops.0.seed", "whole number"),
         ([{"op": "body-part", "part": "tail", "prompt": PROMPT}], {}, "ops.0.part", "upper-body"),
+        ([{"op": "repaint", "from": 4, "to": 2.5, "prompt": PROMPT}], {}, "ops.0.to", "2.5 s, is before the beginning"),
+        ([{"op": "repaint", "from": "f9", "to": "f8"}], {}, "ops.0.to", "the end, frame 8, is before"),
         (
             [{"op": "repaint", "to": 1, "prompt": PROMPT}, {"op": "extend", "seconds": 1}],
             {},

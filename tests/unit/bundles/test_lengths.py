@@ -8,8 +8,10 @@ from typing import Any
 import pytest
 
 from marey.bundles import Bundle, BundleWriter
-from marey.bundles.limits import check_seconds, seconds_of
+from marey.bundles.limits import check_constraints, check_seconds, seconds_of
 from marey.core.errors import InvalidBundle, InvalidInput
+from marey.items.constraints import read_constraints
+from marey.items.item import Item
 from tests.support.plugins import installed, write_distribution
 
 DANCER = """\
@@ -18,11 +20,11 @@ SPEC = ModelSpec("dancer", "", "", handler="a:b", load="a:b", limits=LengthLimit
 """
 
 
-def bundle(path: Path, **parameters: Any) -> Bundle:
+def bundle(path: Path, layout: str | None = None, /, **parameters: Any) -> Bundle:
     with BundleWriter(path) as writer:
         return writer.finish(
             name=path.name, version="1", kind="generator", model="dancer", config="tiny", licence="MIT", fps=20.0,
-            parameters=parameters,
+            parameters=parameters, layout=layout,
         )  # fmt: skip
 
 
@@ -66,3 +68,22 @@ def test_of_a_model_that_is_not_installed_the_bundle_must_say(tmp_path: Path) ->
     assert seconds_of(bundle(tmp_path / "known", min_frames=10, max_frames=600)) == (0.5, 30.0)
     with pytest.raises(InvalidBundle, match="no number as 'max_frames'"):
         seconds_of(bundle(tmp_path / "unknown", min_frames=10))
+
+
+@pytest.mark.parametrize(
+    ("rotations", "message"),
+    [
+        ([[1, 0, 0, 0]] * 24, "24 rotations; the model's skeleton has 22 joints"),
+        ({"hips": [1, 0, 0, 0]}, "unknown joint 'hips': the pose is of another skeleton"),
+    ],
+)
+def test_poses_of_another_skeleton_are_refused_before_the_queue(
+    dancer: None, tmp_path: Path, rotations: Any, message: str
+) -> None:
+    found = bundle(tmp_path / "posed", "humanml3d-263")
+    own = {"type": "pose_keyframe", "frame": 20, "joint_rotations": [[1, 0, 0, 0]] * 22}
+    check_constraints(found, Item("a person walks", constraints=tuple(read_constraints([own]))))
+    other = read_constraints([{**own, "frame": 10, "joint_rotations": rotations}])
+    with pytest.raises(InvalidInput, match=message) as refused:
+        check_constraints(found, Item("a person walks", constraints=(*read_constraints([own]), *other)))
+    assert refused.value.where == "constraints.1.joint_rotations"

@@ -174,6 +174,26 @@ def test_refused(generator: Any, constraint: dict[str, Any], where: str, message
     assert message in refused.value.message
 
 
+@pytest.mark.parametrize(
+    ("place", "target", "far"),
+    [
+        ({"root_position": [0.0, 0.95, 1.0]}, ("head", [0.25, 0.95, 1.0]), "6"),
+        ({"root_height": 0.95}, ("pelvis", [3.0, 0.75, 1.0]), "20 cm"),
+        ({}, ("left_foot", [0.0, 1.2, 0.0]), "1"),
+    ],
+)
+def test_a_target_that_the_pose_of_its_frame_contradicts_is_refused(
+    generator: Any, place: dict[str, Any], target: tuple[str, list[float]], far: str
+) -> None:
+    joint, wanted = target
+    reach = {"type": "effector_target", "joint": joint, "frames": [FRAMES - 1], "positions": [wanted]}
+    earlier = {**reach, "frames": [FRAMES - 21]}
+    constrained_request(generator, request(generator), read_constraints([{**POSE, **place}, earlier]), 3.0, None)
+    with pytest.raises(InvalidInput, match=rf"is {far}.* from the place that the pose of constraints\.0") as refused:
+        constrained_request(generator, request(generator), read_constraints([{**POSE, **place}, reach]), 3.0, None)
+    assert refused.value.where == "constraints.1.positions.0"
+
+
 def test_a_pose_is_read_from_a_motion_file(generator: Any, tmp_path: Path) -> None:
     (clip,) = make(generator, [hand()], 5)
     clip.save_npz(tmp_path / "pose.npz")

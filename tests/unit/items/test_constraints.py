@@ -89,6 +89,10 @@ def changed(base: dict[str, Any], **changes: Any) -> dict[str, Any]:
     return {**base, **changes}
 
 
+def target(joint: str, frame: int, *place: float) -> dict[str, Any]:
+    return {"type": "effector_target", "joint": joint, "frames": [frame], "positions": [place]}
+
+
 @pytest.mark.parametrize(
     ("value", "where", "message"),
     [
@@ -141,6 +145,18 @@ def test_refused(value: Any, where: str, message: str) -> None:
         ([PATH, changed(POSE, root_position=[0.2, 0.9, 1.5])], "constraints.1.root_position", "50 cm from"),
         ([PATH, changed(HAND, positions=[[3, 1, 0], [0, 1, 0]])], "constraints.1.positions.0", "out of reach"),
         ([PATH, changed(PATH, frames=[20, 30, 40])], "constraints.1.positions_xz.0", "stands in constraints.0"),
+        ([PATH, target("pelvis", 10, 0.6, 0.9, 0.5)], "constraints.1.positions.0", "0.60 m from the root path"),
+        ([target("left_wrist", 10, 2, 1, 0), target("right_wrist", 10, 0, 1, 0)], "constraints.1.positions.0",
+         "2.00 m from constraints.0.positions.0, at the same frame 10; left wrist and right wrist"),
+        ([target("head", 10, 0, 0.9, 0), target("left_foot", 10, 0, 0, 2.2)], "constraints.1.positions.0", "2.38 m"),
+        ([target("left_foot", 10, 0, 0, 0.3), target("left_ankle", 10, 0, 0.1, 0)], "constraints.1.positions.0",
+         "at most 0.18 m apart"),
+        ([changed(POSE, root_position=[0, 0.9, 0]), target("head", 20, 2, 1.5, 0)], "constraints.1.positions.0",
+         "from constraints.0.root_position"),
+        ([changed(HAND, frames=[5, 6], positions=[[-1, 1, 0], [1, 1, 0]])], "constraints.0.positions.1",
+         "40.0 m/s from constraints.0.positions.0; at most 25 m/s for left wrist"),
+        ([changed(POSE, root_position=[0, 0.9, 0]), changed(POSE, frame=30, root_position=[0, 0.9, 5])],
+         "constraints.1.root_position", "10.0 m/s from constraints.0.root_position; at most 8 m/s for pelvis"),
     ],
 )  # fmt: skip
 def test_refused_for_a_clip(value: Any, where: str, message: str) -> None:
@@ -148,6 +164,13 @@ def test_refused_for_a_clip(value: Any, where: str, message: str) -> None:
         check_clip(read_constraints(value), 60, 20.0)
     assert refused.value.where == where
     assert message in refused.value.message
+
+
+def test_places_that_a_stretched_body_has_are_not_refused() -> None:
+    arms = [target("left_wrist", 10, 0.78, 1.4, 0), target("right_wrist", 10, -0.78, 1.4, 0)]
+    kick = [target("right_foot", 30, 0, 1.1, 1), target("left_foot", 30, 0, 0, 0), target("head", 30, 0, 1.6, -0.2)]
+    swing = [changed(HAND, frames=[40, 42], positions=[[-0.5, 1, 0.3], [0.5, 1.8, 0.3]])]
+    check_clip(read_constraints([*arms, *kick, *swing]), 60, 20.0)
 
 
 def test_speed_depends_on_the_rate_of_the_clip() -> None:

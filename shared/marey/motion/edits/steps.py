@@ -114,7 +114,23 @@ def _read(row: object, where: str) -> Step:
     if unknown := [str(name) for name in given if name not in known]:
         hint = f"Known: {', '.join(known)}." if known else f"{operation.name} has none."
         raise InvalidInput(f"unknown parameter {unknown[0]!r:.80} of {operation.name}", where=where, hint=hint)
-    return Step(operation, {name: _value(each, given.get(name), where) for name, each in known.items()}, where)
+    values = {name: _value(each, given.get(name), where) for name, each in known.items()}
+    _check_range(values.get("from"), values.get("to"), where)
+    return Step(operation, values, where)
+
+
+def _check_range(begin: object, end: object, where: str) -> None:
+    """Check that a range does not end before it begins, as far as both moments are of one kind: seconds, or frames."""
+    if isinstance(begin, str) and isinstance(end, str):
+        is_backward = int(end.removeprefix("f")) < int(begin.removeprefix("f"))
+    else:
+        is_backward = isinstance(begin, int | float) and isinstance(end, int | float) and end < begin
+    if is_backward:
+        raise InvalidInput(f"the end, {_named(end)}, is before the beginning, {_named(begin)}", where=f"{where}.to")
+
+
+def _named(moment: object) -> str:
+    return f"frame {moment.removeprefix('f')}" if isinstance(moment, str) else f"{moment:g} s"
 
 
 def _value(parameter: Parameter, value: Any, where: str) -> Any:

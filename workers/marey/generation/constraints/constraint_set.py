@@ -13,8 +13,11 @@ from marey.items.constraint_frames import frames_of
 from marey.items.constraints import EFFECTOR_TARGET, POSE_KEYFRAME, ROOT_PATH
 from marey.motion.hands import arms
 from marey.motion.keyframes import ordered_rotations
+from marey.motion.kinematics import forward_kinematics
 from marey.motion.rotations import Array, normalize
 from marey.motion.skeleton import Skeleton
+from marey.motion.stance import standing_height
+from marey.quality.constraints import EFFECTOR_M, POSE_M
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,16 +104,44 @@ def asked_of(constraints: Sequence[Mapping[str, Any]], skeleton: Skeleton, frame
     """Return checked constraints as arrays.
 
     Raises:
-        InvalidInput: a pose of another skeleton, or one that still names a motion; with the field in `where`.
+        InvalidInput: a pose of another skeleton, one that still names a motion, or one in which a joint is not where a
+            target at the same frame wants it; with the field in `where`.
     """
     numbered = list(enumerate(constraints))
-    return ConstraintSet(
+    asked = ConstraintSet(
         fps,
         frames,
         tuple(_path(number, each, fps) for number, each in numbered if each["type"] == ROOT_PATH),
         tuple(_keyframe(number, each, skeleton) for number, each in numbered if each["type"] == POSE_KEYFRAME),
         tuple(_target(number, each, skeleton) for number, each in numbered if each["type"] == EFFECTOR_TARGET),
     )
+    for key in asked.keyframes:
+        _check_pose(key, asked.targets, skeleton)
+    return asked
+
+
+def _check_pose(key: Keyframe, targets: Sequence[Target], skeleton: Skeleton) -> None:
+    """Check that joints of a pose are at the targets that its frame has; of a pose without a place, their heights.
+
+    Raises:
+        InvalidInput: one is farther away than both bars together.
+    """
+    at_once = [(target, target.frames.index(key.frame)) for target in targets if key.frame in target.frames]
+    if not at_once:
+        return
+    height = standing_height(key.rotations, skeleton) if key.height is None else key.height
+    root = np.array([0.0, height, 0.0]) if key.root is None else key.root
+    joints = forward_kinematics(skeleton, key.rotations[None], root[None])[0]
+    for target, point in at_once:
+        way = target.places[point] - joints[target.joint]
+        far = float(np.linalg.norm(way) if key.root is not None else abs(way[1]))
+        if far > POSE_M + EFFECTOR_M:
+            raise InvalidInput(
+                f"is {100 * far:.0f} cm from the place that the pose of constraints.{key.number} gives to it, at the "
+                f"same frame {key.frame}; at most {100 * (POSE_M + EFFECTOR_M):.0f}",
+                where=f"constraints.{target.number}.positions.{point}",
+                hint="Leave one of the two out, or give them frames of their own.",
+            )
 
 
 def effector(skeleton: Skeleton, name: str) -> int:

@@ -10,7 +10,9 @@ from typing import Any, cast
 import numpy as np
 
 from marey.core.errors import InvalidInput
+from marey.generation.gazing import with_gaze
 from marey.generation.port import GenerationControl, Generator, KeepingGenerator
+from marey.generation.shots.asked_frames import CANCELLED, SHORTEST_S, asks_more, frames_alone, joined
 from marey.generation.shots.context import Float32, check_error, context_error, frames_at, model_features
 from marey.generation.shots.windows import CONTEXT, FrameGap, Window, crossfaded, fill, most_frames, no_text
 from marey.generation.software import origin_of
@@ -24,9 +26,6 @@ from marey.text.features import TextFeatures
 PROMPTED_CONTEXT = 4
 """Frames that the model reads on a side where it also reads a prompt; with more it follows the prompt less
 (docs/decisions/0037-edits-by-a-model.md)."""
-
-
-CANCELLED = "the edit was cancelled"
 
 
 @dataclass
@@ -82,9 +81,11 @@ class EditModel:
     def generate(self, prompt: str, seed: int, frames: int, fps: float, body: MotionClip) -> MotionClip:
         """Generate a motion of a prompt alone, on the body of a clip: `frames` frames at `fps`."""
         rate = self.generator.layout.fps
-        count = math.ceil((frames - 1) / fps * rate) + 1
-        nothing = np.zeros((count, self.generator.layout.dim), np.float32)
-        return part(self._clip(self._continued(nothing, 0, count, prompt, seed), fps, body), 0, frames - 1)
+        count = max(math.ceil((frames - 1) / fps * rate) + 1, 2)
+        made = frames_alone(self.generator, self.read(prompt), seed, count, self.settings, control=self.control)
+        clip = self._clip(made.features, fps, body)
+        gazing = with_gaze(replace(clip, manifest={**made.changes, "seed": seed}))
+        return part(gazing, 0, frames - 1)
 
     def between(
         self,
@@ -146,6 +147,12 @@ class EditModel:
         """Fill a gap, with up to `CONTEXT` frames beside it."""
         before, after = before[max(0, len(before) - CONTEXT) :], after[:CONTEXT]
         start, end = len(before), len(before) + frames
+        text = None if prompt is None else self.read(prompt)
+        has_room = frames >= SHORTEST_S * self.generator.limits.fps
+        if text is not None and has_room and asks_more(self.generator, text, self.settings):
+            new = frames_alone(self.generator, text, seed, frames, self.settings, control=self.control).features
+            made = joined(self.generator, before, new, after, seed, self.settings, control=self.control)
+            return Window(made, start, end)
         whole = np.concatenate([before, np.zeros((frames, before.shape[1]), np.float32), after])
         return Window(self._continued(whole, start, end, prompt, seed), start, end)
 
