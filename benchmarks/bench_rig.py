@@ -16,7 +16,7 @@ from marey.motion.retarget import load_body, retarget, source_of
 from tests.support.walker import walker
 
 FRAMES = 200
-CALLS = 100
+CALLS = 1000
 
 
 def main() -> None:

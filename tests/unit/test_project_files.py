@@ -26,6 +26,16 @@ def steps(path: Path) -> list[dict[str, Any]]:
     return [step for job in jobs.values() for step in job["steps"]]
 
 
+def test_the_programs_that_read_files_are_installed_in_ci_and_none_may_be_missing() -> None:
+    commands = [step.get("run", "") for path in WORKFLOWS for step in steps(path)]
+    assert "make clients" in commands
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    (recipe,) = re.findall(r"^clients: .*\n((?:\t.*\n)+)", makefile, re.MULTILINE)
+    assert "MAREY_REQUIRE_CLIENTS=1" in recipe
+    for program in ("bpy==", "pufbx==", "usd-core==", "three@", "gltf-validator@", "three-vrm-animation@"):
+        assert program in recipe
+
+
 def test_the_readme_is_short_and_begins_with_licence_and_actions() -> None:
     lines = README.splitlines()
     assert len(lines) <= 120

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -13,8 +14,9 @@ from marey.motion import MotionClip, edit
 from marey.motion.arrange import moved, placement_of
 from marey.motion.edits.loop_bars import Bars, Fault
 from marey.motion.edits.loop_blend import closed
-from marey.motion.edits.loop_feet import onsets, standing_spans, stands, supports
-from marey.motion.edits.loop_search import cycles
+from marey.motion.edits.loop_ease import eased, smoothed
+from marey.motion.edits.loop_feet import on_the_spot, onsets, standing_spans, stands, supports
+from marey.motion.edits.loop_search import cycles, has_steps
 from marey.motion.edits.steps import read_steps
 from marey.motion.edits.timeline_rows import cut_rows, prompt_after_cuts
 from marey.motion.export_options import ExportOptions
@@ -184,7 +186,7 @@ def test_a_motion_without_a_cycle_is_refused_with_the_bar_that_it_misses():
     )
     root = np.tile([0.0, 0.94, 0.0], (frames, 1))
     rising = MotionClip.of(HUMANML3D, rotations, root, np.ones((frames, 4), bool), 20.0)
-    with pytest.raises(InvalidInput, match=r"no cycle without a visible seam: .* mm at the seam"):
+    with pytest.raises(InvalidInput, match=r"no cycle without a visible seam: .* mm (at the seam|in the blend), "):
         edit(rising, [LOOP])
 
 
@@ -345,6 +347,97 @@ def test_slower_blends_are_tried_before_a_motion_is_refused(monkeypatch):
         edit(walked(), [LOOP])
     assert asked == sorted(asked)
     assert set(asked) == {0.0, 0.04 * 6}
+
+
+@pytest.mark.parametrize("speed", [1.0, 1.6])
+def test_a_short_walk_loops_by_a_blend_that_is_changed(speed, monkeypatch):
+    """Two gait cycles leave few candidates, and each misses a bar by some percent."""
+    clip = swaying(bodies.Body(1.8, speed=lambda t: speed + 0 * t, duty=0.6, cadence=1.8))
+    (loop,) = edit(clip, [LOOP])
+    blend, played = loop.manifest["loop"]["blend_frames"], thrice(loop).joints
+    own = slice(loop.frames - 1 - blend["last"], loop.frames - 1 + blend["first"])
+    for number in (1, 2):
+        source, found = (np.linalg.norm(np.diff(joints, number, axis=0), axis=-1) for joints in (clip.joints, played))
+        assert (found[own].max(axis=0) <= 1.1 * source.max(axis=0) + 2e-4).all()
+    monkeypatch.setattr("marey.motion.edits.loop.eased", lambda *_: Fault(2.0, "it stays as it is"))
+    with pytest.raises(InvalidInput, match=r"\d mm (in the blend|at the seam), "):
+        edit(clip, [LOOP])
+
+
+def test_a_smoothed_blend_keeps_its_ends_and_standing_feet(walk):
+    cycle = next(each for each in cycles(walk, walk.contacts, 6, 100) if each.first >= 6)
+    plain = closed(walk, walk.contacts, cycle, 6)
+    after = smoothed(walk, plain, np.array([2.0, 2.0, 2.0, 0.0]))
+    was, now = (forward_kinematics(walk.skeleton, each.rotations, each.root) for each in (plain, after))
+    np.testing.assert_allclose(now[:-6], was[:-6], atol=1e-9)
+    np.testing.assert_allclose(now[-1], was[-1], atol=1e-9)
+    wrists = [walk.skeleton.index(name) for name in ("R_wrist", "L_wrist")]
+    bend = [np.linalg.norm(np.diff(each[-7:, wrists[0]], 2, axis=0), axis=-1) for each in (was, now)]
+    assert bend[1].max() < bend[0].max()
+    free = walk.skeleton.index("L_elbow")  # strength 0
+    np.testing.assert_allclose(after.rotations[:, free], plain.rotations[:, free], atol=1e-9)
+    held = np.repeat(stands(plain.contacts), 2, axis=1)[-6:-1]
+    moved = np.linalg.norm((now - was)[-6:-1][:, list(walk.skeleton.feet)], axis=-1)
+    assert held.any()
+    assert moved[held].max() < 2e-3
+    assert np.linalg.norm((now - was)[-6:-1], axis=-1).max() > 5e-3
+
+
+def test_a_loop_that_misses_a_bar_by_far_is_judged_once(walk):
+    cycle = next(iter(cycles(walk, walk.contacts, 6, 100)))
+    asked: list[object] = []
+    assert eased(walk, walk.contacts, cycle, 6, lambda loop: asked.append(loop) or Fault(3.0, "far")) == Fault(3, "far")
+    assert len(asked) == 1
+
+
+def test_all_pairs_are_tried_before_a_motion_is_refused(walk):
+    few, all_ = ({(each.first, each.last) for each in cycles(walk, walk.contacts, 6, 10_000, n)} for n in (1, 0))
+    assert few < all_
+
+
+def test_the_reason_of_a_refusal_is_the_bar_that_is_missed_most(walk):
+    """Of two bars that are missed, the smaller miss would say that the motion is nearly a loop."""
+    bars = Bars(walk)
+    faults = 0
+    for cycle in cycles(walk, walk.contacts, 6, 60):
+        begun = cycle.first + 5, cycle.last  # no whole gaits: its blend hurries
+        found = bars.best(closed(walk, walk.contacts, replace(cycle, first=begun[0], last=begun[1]), 6))
+        if isinstance(found, Fault) and "in the blend" in found.reason:
+            faults += 1
+            assert found.excess > 1.5
+    assert faults > 10
+
+
+def treadmill(clip: MotionClip) -> MotionClip:
+    """A walk whose root stays, as clips of games have it: feet slide back, and none stands."""
+    root = clip.root * np.array([0.0, 1.0, 0.0], np.float32)
+    return MotionClip.of(clip.skeleton, clip.rotations, root, np.zeros((clip.frames, 4), bool), clip.fps)
+
+
+def test_a_walk_on_the_spot_keeps_whole_gait_cycles():
+    clip = treadmill(walked(3.4))
+    feet = supports(clip.joints, clip.contacts, clip.skeleton, clip.fps)
+    begins = [foot for _, _, foot in standing_spans(feet)]
+    assert len(begins) >= 5
+    assert all(foot != other for foot, other in pairwise(begins))
+    assert has_steps(clip, clip.contacts)
+    (loop,) = edit(clip, [LOOP])
+    count = loop.manifest["loop"]["cycle"]["seconds"] * 1.8 / 2
+    assert abs(count - round(count)) < 0.08
+    assert loop.manifest["loop"]["cycle"]["z"] == pytest.approx(0, abs=0.01)
+
+
+@pytest.mark.parametrize("case", ["stands", "travels", "one foot"])
+def test_other_bodies_do_not_walk_on_the_spot(case, walk):
+    clip = treadmill(walk)
+    joints, contacts = clip.joints.astype(np.float64), clip.contacts.copy()
+    if case == "stands":
+        contacts[3, 0] = True
+    elif case == "travels":
+        joints = walk.joints.astype(np.float64)
+    else:
+        joints[:, clip.skeleton.index("L_foot"), 1] += 0.5
+    assert not on_the_spot(joints, contacts, clip.skeleton).any()
 
 
 def test_a_loop_of_a_timeline_has_the_rows_of_its_cycle():

@@ -20,7 +20,7 @@ from marey.motion.rigs.joint_map import map_joints
 from marey.motion.rigs.read import parse_rig
 from marey.motion.rotations import Array, multiply, rotate
 from marey.motion.skeleton import HUMANML3D
-from tests.support.archives import archive
+from tests.support.archives import archive, first_files
 from tests.support.bodies import FPS, Body
 from tests.support.changed_rigs import lively, source_on_rig
 from tests.support.cmu_pairs import BONES, JOINTS, angles, directions, iclone_trial, pairs, turned_to
@@ -97,6 +97,17 @@ MEMBERS = {
         "hips|spine ribs|neck|head|shoulder_L upper_arm_L_01 forearm_L_01 hand_L thigh_L_01 shin_L_01 foot_L toe_L"
     ),
 }
+CAPTURED = {
+    "bandai-namco.tar.xz": (
+        "Hips|Spine Chest|Neck|Head|Shoulder_L UpperArm_L LowerArm_L Hand_L UpperLeg_L LowerLeg_L Foot_L Toes_L"
+    ),
+    "cmu-iclone.tar.xz": prefixed(
+        "CC_Base_",
+        "Hip|Waist Spine01 Spine02|NeckTwist01 NeckTwist02|Head|"
+        "L_Clavicle L_Upperarm L_Forearm L_Hand L_Thigh L_Calf L_Foot L_ToeBase",
+    ),
+}
+"""Archives of which all files have one rig."""
 LIMBS = ("shoulder", "upper_arm", "lower_arm", "hand", "upper_leg", "lower_leg", "foot", "toes")
 
 
@@ -150,6 +161,12 @@ def check_map(data: bytes, name: str, table: str) -> None:
 @pytest.mark.parametrize("name", FILES)
 def test_the_joints_of_a_rig_are_those_of_a_table_written_by_hand(name):
     check_map(archive(name).read_bytes(), name, FILES[name])
+
+
+@pytest.mark.parametrize("name", CAPTURED)
+def test_the_joints_of_captured_motions_are_those_of_a_table_written_by_hand(name):
+    for stem, data in first_files(name, 3).items():
+        check_map(data, f"{stem}.bvh", CAPTURED[name])
 
 
 @pytest.mark.slow

@@ -2,7 +2,8 @@
 
 Candidates are pairs of frames with nearly the same pose and movement (`loop_search.py`). Each is closed by a blend
 before its end (`loop_blend.py`); the first one that keeps all bars (`loop_bars.py`) is the loop, or
-the best of those in which a joint moves most at the seam where all are so.
+the best of those in which a joint moves most at the seam where all are so. Before a motion is refused, all pairs are
+tried, and blends that miss a bar by little are changed (`loop_ease.py`).
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from marey.motion.clip import MotionClip
 from marey.motion.edits.feet import found_contacts
 from marey.motion.edits.loop_bars import Bars, Fault
 from marey.motion.edits.loop_blend import Closed, closed
+from marey.motion.edits.loop_ease import eased
 from marey.motion.edits.loop_search import SHORTEST_STILL, Cycle, cycles, has_steps
 from marey.motion.edits.place import heading_of, posed
 from marey.motion.edits.prompt_frames import with_prompts_at
@@ -65,6 +67,12 @@ def loop(clip: MotionClip, values: Mapping[str, Any]) -> MotionClip:
             best = found if best is None or found.excess < best.excess else best
     if spare:
         return _result(clip, *spare, values)
+    for window in dict.fromkeys(window for window, _ in _blends(clip, contacts, values["blend"])):
+        for cycle in cycles(clip, contacts, window, TRIED, neighbours=0):
+            found = eased(clip, contacts, cycle, window, bars.best)
+            if isinstance(found, Closed):
+                return _result(clip, found, cycle, values)
+            best = found if best is None or found.excess < best.excess else best
     raise _refused(clip, contacts, best)
 
 

@@ -93,9 +93,10 @@ class Bars:
             seams.append((fault, _worst(fault, *(self._peak(*peak) for peak in peaks)).excess))
         earlier = min(range(len(seams)), key=lambda number: (seams[number][0].excess > 1.0, seams[number][1]))
         fault, hitch = seams[earlier]
+        hurried = self._hurry(moves, cycle, loop.blend)
         if fault.excess > 1.0:
-            return min((each for each, _ in seams), key=lambda each: each.excess)
-        if (hurried := self._hurry(moves, cycle, loop.blend)).excess > 1.0:
+            return _worst(min((each for each, _ in seams), key=lambda each: each.excess), hurried)
+        if hurried.excess > 1.0:
             return hurried
         begun = replace(loop.begun(earlier), hitch=hitch)
         return self._foot_fault(played(self._clip, begun), loop.blend) or begun

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.motion.feet import runs
+from marey.motion.feet import FLOOR_BAND, runs
 from marey.motion.filters import smooth
 from marey.motion.rotations import Array
 from marey.motion.skeleton import Skeleton
@@ -19,11 +19,13 @@ CARRIES = 0.5
 """Largest speed of a carrying toe over that of the root."""
 LOW = 0.08
 """Largest height of a carrying toe over its lowest, metres."""
+SPOT = 0.1
+"""Metres within which the root of a body stays that walks on the spot, as on a treadmill."""
 
 
 def supports(joints: Array, contacts: Bool, skeleton: Skeleton, fps: float) -> Bool:
-    """Return where each foot (T, 2), left and right, carries the body: it stands, or it hardly moves under a body that
-    runs.
+    """Return where each foot (T, 2), left and right, carries the body: it stands, it hardly moves under a body that
+    runs, or it slides back under one that walks on the spot.
 
     Args:
         joints: (T, J, 3) metres.
@@ -40,7 +42,23 @@ def supports(joints: Array, contacts: Bool, skeleton: Skeleton, fps: float) -> B
         speed = np.linalg.norm(np.gradient(place, axis=0)[:, [0, 2]], axis=-1) * fps
         low = place[:, 1] < np.quantile(place[:, 1], 0.02) + LOW
         found[:, side] |= (pace > RUNS) & (speed < CARRIES * pace) & low
-    return found
+    return found | on_the_spot(joints, contacts, skeleton)
+
+
+def on_the_spot(joints: Array, contacts: Bool, skeleton: Skeleton) -> Bool:
+    """Return where the feet (T, 2) carry a body that walks on the spot: the lower one, if the body stays at its place,
+    both feet come near the floor in turn, and none ever stands still; else nowhere.
+
+    Clips of games are made so: the root stays, and the feet move against the floor all the time.
+    """
+    joints = np.asarray(joints, np.float64)
+    none = np.zeros((len(joints), 2), bool)
+    toes = joints[:, list(skeleton.feet[1::2])]
+    if contacts.any() or np.ptp(joints[:, 0, [0, 2]], axis=0).max() > SPOT:
+        return none
+    near = toes[..., 1] < min(toes[..., 1].min(), FLOOR_BAND[1]) + LOW
+    alone = near & ~near[:, ::-1]
+    return near if alone.any(axis=0).all() else none
 
 
 def stands(contacts: Bool) -> Bool:

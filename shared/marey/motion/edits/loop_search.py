@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from marey.core.errors import InvalidInput
 from marey.motion.clip import MotionClip
-from marey.motion.edits.loop_feet import onsets, supports
+from marey.motion.edits.loop_feet import on_the_spot, onsets, supports
 from marey.motion.kinematics import facing
 from marey.motion.rotations import Array
 
@@ -36,7 +36,7 @@ there would miss the bars."""
 PERCENTILE = 95.0
 """Of the steps of a joint in the source: the largest step at a seam."""
 NEIGHBOURS = 1
-"""Frames within which only the best of two beginnings or ends is tried."""
+"""Frames within which only the best of two beginnings or ends is tried at first."""
 
 
 @dataclass(frozen=True)
@@ -54,22 +54,24 @@ class Cycle:
 
 
 def has_steps(clip: MotionClip, contacts: Bool) -> bool:
-    """Return True for locomotion: both feet step, and the body travels."""
+    """Return True for locomotion: both feet step, and the body travels, or its feet slide back under it."""
     steps = onsets(_supports(clip, contacts)).sum(axis=0)
-    return bool(steps.min() >= 1 and _way(clip)[-1] / clip.seconds > TRAVELS)
+    moves = _way(clip)[-1] / clip.seconds > TRAVELS or on_the_spot(clip.joints, contacts, clip.skeleton).any()
+    return bool(steps.min() >= 1 and moves)
 
 
 def _supports(clip: MotionClip, contacts: Bool) -> Bool:
     return supports(clip.joints, contacts, clip.skeleton, clip.fps)
 
 
-def cycles(clip: MotionClip, contacts: Bool, window: int, most: int) -> Iterator[Cycle]:
+def cycles(clip: MotionClip, contacts: Bool, window: int, most: int, neighbours: int = NEIGHBOURS) -> Iterator[Cycle]:
     """Yield at most `most` candidates, the nearest first, none of them a neighbour of one before.
 
     Args:
         clip: with known hips and shoulders.
         contacts: (T, 4).
         window: frames of the blend; poses are compared over it.
+        neighbours: frames within which another one is a neighbour; 0 = none is.
 
     Raises:
         InvalidInput: the motion is too long, or too short for any cycle.
@@ -89,8 +91,8 @@ def cycles(clip: MotionClip, contacts: Bool, window: int, most: int) -> Iterator
         if not np.isfinite(cost[first, last]):
             return
         yield Cycle(int(first), int(last), float(cost[first, last]))
-        near = slice(max(first - NEIGHBOURS, 0), first + NEIGHBOURS + 1)
-        cost[near, max(last - NEIGHBOURS, 0) : last + NEIGHBOURS + 1] = np.inf
+        near = slice(max(first - neighbours, 0), first + neighbours + 1)
+        cost[near, max(last - neighbours, 0) : last + neighbours + 1] = np.inf
 
 
 def _lengths(clip: MotionClip, shortest: float) -> Bool:
