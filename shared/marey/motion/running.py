@@ -144,7 +144,7 @@ def with_flights(joints: Array, contacts: Bool, skeleton: Skeleton, fps: float) 
 def _flights(joints: Array, contacts: Bool, skeleton: Skeleton, fps: float) -> Bool:
     """Return the frames (T,) of the short flights of a run; those at the ends of the clip are none."""
     going, flies = running_frames(joints, skeleton, fps), np.zeros(len(joints), bool)
-    for begin, end in runs(~contacts.any(axis=1)):
+    for begin, end in runs(np.asarray(~contacts.any(axis=1))):
         inside = begin > 0 and end < len(joints)
         flies[begin:end] = inside and going[begin:end].all() and end - begin <= FLIGHT_S * fps
     return flies

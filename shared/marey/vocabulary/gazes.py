@@ -118,7 +118,8 @@ def _spans(prompt: str) -> Iterator[tuple[int, int, list[Glance]]]:
         found.append(
             (again.start(), again.end(), [cast("Glance", f"twice_{again['side']}" if again["side"] else "twice")])
         )
-    found += [(each.start(), each.end(), ["around"]) for each in _TURNS_HEAD.finditer(text)]
+    for head in _TURNS_HEAD.finditer(text):
+        found.append((head.start(), head.end(), ["around"]))
     for looks in _LOOKS.finditer(text):
         at, glances = looks.end(), list[Glance]()
         while (step := _STEP.match(text, at)) is not None:

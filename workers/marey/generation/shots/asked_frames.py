@@ -17,7 +17,8 @@ import numpy as np
 from marey.core.errors import InvalidInput
 from marey.drawing.kinds import DRAWINGS
 from marey.generation.asked import changes_of, drawing_of, draws
-from marey.generation.bearing import borne, borne_spans
+from marey.generation.bearing import borne_spans
+from marey.generation.bearing_drawing import borne
 from marey.generation.drawn_whole import ALONE
 from marey.generation.fine import FINE
 from marey.generation.port import GenerationControl, Generator, Request, S
