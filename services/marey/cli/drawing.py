@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import threading
 from collections import deque
 from collections.abc import Iterable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
@@ -119,15 +120,27 @@ def draw(drawing: Drawing) -> Pixels:
 
 @contextmanager
 def _without_interrupts() -> Iterator[None]:
-    """Let Ctrl-C, which every process of a terminal gets, wait: only the command itself answers it."""
+    """Let Ctrl-C, which every process of a terminal gets, wait: only the command itself answers it, afterwards.
+
+    A process that is started meanwhile inherits the mask. The mask of this thread alone does not keep the handler from
+    running in it: another thread, such as that of a progress bar, may take the signal.
+    """
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
+    handler, waiting = signal.getsignal(signal.SIGINT), list[int]()
+    answers = threading.current_thread() is threading.main_thread() and handler is not None
+    if answers:
+        signal.signal(signal.SIGINT, lambda number, _: waiting.append(number))
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        if answers:
+            signal.signal(signal.SIGINT, handler)
+        if waiting:
+            signal.raise_signal(signal.SIGINT)
 
 
 def _begin() -> None:

@@ -20,6 +20,8 @@ Bool = NDArray[np.bool_]
 
 TURNS, LEAST = 90.0, 40.0
 """Degrees a second from which on a foot turns on the floor, and degrees of a turn that is looked at."""
+LEAST_S, SWEEPS = 0.1, 3.0
+"""Seconds of a turn at least, and metres a second of its toe at most: one that turns faster swings."""
 LOW_M = 0.05
 """Metres over their standing height up to which a heel and a toe are on the floor."""
 GAP_S = 0.15
@@ -28,6 +30,8 @@ HEEL, STEEPEST = 22.0, 50.0
 """Degrees by which the heel is lifted about the toes, and of the foot over the floor at most."""
 RISES_S = 0.07
 """Standard deviation of the filter with which the heel comes up and goes down, seconds."""
+EASES_S = 0.06
+"""The same of the filter with which the body begins to go along with the foot."""
 ALONE = 0.6
 """Share of the frames of a turn in which the other foot is in the air, at least."""
 
@@ -61,10 +65,14 @@ def _turns(joints: Array, skeleton: Skeleton, fps: float, side: int) -> list[tup
             begin > 0 and end < len(fast) and end - begin <= GAP_S * fps and fast[begin - 1] and fast[end]
         )
     steps = np.abs(np.diff(yaw, append=yaw[-1]))
+    speed = length(np.gradient(toe, axis=0)) * fps
     return [
         (begin, end)
         for begin, end in runs(fast)
-        if np.degrees(steps[begin:end].sum()) > LEAST and 1.0 - float(np.mean(other[begin:end])) >= ALONE
+        if np.degrees(steps[begin:end].sum()) > LEAST
+        and 1.0 - float(np.mean(other[begin:end])) >= ALONE
+        and end - begin >= LEAST_S * fps
+        and speed[begin:end].max() < SWEEPS
     ]
 
 
@@ -81,6 +89,7 @@ def _turned(joints: Array, skeleton: Skeleton, fps: float, side: int, turn: tupl
     stays[begin:end] = ball[begin] - ball[begin:end]
     stays[end:] = ball[begin] - ball[end - 1]
     stays[:, 1] = 0.0
+    stays = smooth(stays, EASES_S * fps)  # the body does not begin and end to go along at once
     sole = ankle - ball
     far, flat = length(sole), np.maximum(length(sole[:, [0, 2]]), 1e-6)
     steep = np.arcsin(np.clip(sole[:, 1] / np.maximum(far, 1e-6), -1.0, 1.0))

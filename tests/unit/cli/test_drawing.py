@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
+import threading
+import time
 from pathlib import Path
+
+import pytest
+
+from marey.cli import drawing
 
 LEAVE = """
 from marey.cli import drawing
@@ -29,3 +36,27 @@ def test_a_command_that_leaves_while_pictures_are_sent_ends(tmp_path: Path) -> N
         [sys.executable, tmp_path / "leave.py"], capture_output=True, text=True, timeout=60, check=False
     )
     assert (done.returncode, done.stdout) == (0, "left\n"), done.stderr
+
+
+def test_an_interrupt_that_another_thread_takes_waits_until_a_process_is_started() -> None:
+    """Python answers a signal in the main thread, whichever thread it was sent to, and whatever that one's mask is."""
+    done, going = list[str](), threading.Event()
+    other = threading.Thread(target=going.wait)
+    other.start()
+
+    def start() -> None:
+        with drawing._without_interrupts():
+            signal.pthread_kill(other.ident or 0, signal.SIGINT)
+            for _ in range(100):  # the handler would have run between two of these
+                time.sleep(0.001)
+            done.append("started")
+        done.append("went on")
+
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            start()
+    finally:
+        going.set()
+        other.join()
+    assert done == ["started"]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
