@@ -6,7 +6,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-from marey.vocabulary.inflection import gerund, third_person
+from marey.vocabulary.inflection import gerund, in_form_of, third_person
 
 _DET = r"(?:(?:an?|the|his|her|their|its|another|some)\ (?:[\w-]+'s\ )?)"
 _SUCH = r"(?:(?!and\b|then\b|to\b|from\b|of\b|as\b)[\w-]+\ ){0,2}?"
@@ -113,7 +113,7 @@ def with_blows_met(prompt: str) -> str:
 
 
 def _hit(found: re.Match[str]) -> str:
-    return f"{_as(found['verb'], 'get')} hit{' in' if found[0].endswith(' to') else ''}"
+    return f"{in_form_of(found['verb'], 'get')} hit{' in' if found[0].endswith(' to') else ''}"
 
 
 def _sent(found: re.Match[str]) -> str:
@@ -135,10 +135,4 @@ def _dodges(found: re.Match[str]) -> str:
         return found[0]
     side = re.search(r"\b(?:left|right)\b", found["how"], re.IGNORECASE)
     to = f" to the {side[0].lower()}" if side else " back" if re.search(r"\bback", found["how"]) else ""
-    return f"{_as(found['verb'], 'dodge')}{to}{'' if to else found['what'] or ''}"
-
-
-def _as(said: str, verb: str) -> str:
-    """Return a verb in the form of another one."""
-    end = said.lower()
-    return gerund(verb) if end.endswith("ing") else third_person(verb) if end.endswith("s") else verb
+    return f"{in_form_of(found['verb'], 'dodge')}{to}{'' if to else found['what'] or ''}"

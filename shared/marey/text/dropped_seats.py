@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import re
 
+from marey.vocabulary.inflection import in_form_of
+
 _OF = r"(?:(?:the|a|an|his|her|their|its|some|that|this)\ )?(?:(?!floor|ground)[\w-]+\ ){0,2}?"
 _SEATS = (
     r"(?:couch|sofa|settee|loveseat|(?:arm|easy\ |deck|office\ |rocking\ )?chairs?|recliner|bench|seats?|stools?|throne"
@@ -75,7 +77,4 @@ def _manner(found: re.Match[str]) -> str:
 
 def _as_verb(found: re.Match[str], *, lies: bool) -> str:
     """Return a verb of sitting or lying in the form of the one that is found."""
-    end = (found["end"] or "").lower()
-    if end.endswith("ing"):
-        return "lying" if lies else "sitting"
-    return ("lies" if lies else "sits") if end.endswith("s") else ("lie" if lies else "sit")
+    return in_form_of(found["end"] or "", "lie" if lies else "sit")

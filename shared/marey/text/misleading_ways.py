@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 
+from marey.vocabulary.inflection import in_form_of
+
 _UP_TO = re.compile(
     r"""\b(?P<way>(?:walk|run|jog|stroll|stride|march|step|go|come|sneak)(?:s|es|ing)?)\ (?:right\ |straight\ )?up\ to
     (?=\ (?:the|a|an|him|her|them|his|their|me|you)\b)
@@ -101,7 +103,7 @@ def with_exits(prompt: str) -> str:
 def _up_and_down(found: re.Match[str]) -> str:
     """Return a way up stairs and down, told one after the other."""
     way, how, steps = found["way"], found["how"] or "", found["steps"]
-    return f"{way}{how} up {steps}, {_as_verb(way, 'turn')} around and {way}{how} down {steps}"
+    return f"{way}{how} up {steps}, {in_form_of(way, 'turn')} around and {way}{how} down {steps}"
 
 
 def _down_again(found: re.Match[str]) -> str:
@@ -109,16 +111,10 @@ def _down_again(found: re.Match[str]) -> str:
     if not (found["way"] or found["back"]):
         return found[0]
     verb = found["up"].split()[0]
-    way = (found["way"] or _as_verb(verb, "walk")).strip()
+    way = (found["way"] or in_form_of(verb, "walk")).strip()
     turned = re.search(r"\b(?:turn|spin|pivot)\w*", found["more"], re.IGNORECASE)
-    joint = found["joint"] if turned else f", {_as_verb(verb, 'turn')} around and "
+    joint = found["joint"] if turned else f", {in_form_of(verb, 'turn')} around and "
     return f"{found['up']}{found['more']}{joint}{way} down the stairs"
-
-
-def _as_verb(said: str, verb: str) -> str:
-    """Return a verb in the form of another one."""
-    end = next((end for end in ("ing", "s") if said.lower().endswith(end)), "")
-    return f"{verb}{end}"
 
 
 def _with_turns(found: re.Match[str]) -> str:
@@ -135,11 +131,9 @@ def _with_turns(found: re.Match[str]) -> str:
 
 def _walks_off(found: re.Match[str]) -> str:
     """Return a way to a side as a walk."""
-    end = (found["end"] or "").lower()
-    return f"walk{'ing' if end == 'ing' else 's' if end else ''} off to the {found['side']}"
+    return f"{in_form_of(found['end'] or '', 'walk')} off to the {found['side']}"
 
 
 def _walks_away(found: re.Match[str]) -> str:
     """Return who goes away as who walks, in the form of the verb that is found."""
-    end = found["end"].lower()
-    return f"{found['joint']}walk{'ing' if end == 'ing' else 's'} away"
+    return f"{found['joint']}{in_form_of(found['end'], 'walk')} away"

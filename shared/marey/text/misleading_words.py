@@ -13,6 +13,7 @@ from marey.text.misleading_ways import with_exits, with_stairs_down, with_turns_
 from marey.text.punched_air import with_pumped_fists
 from marey.text.turned_ways import with_turns_told
 from marey.vocabulary.bearing_words import stated_bearings
+from marey.vocabulary.inflection import in_form_of
 from marey.vocabulary.scope import STANDING
 
 _STRUCK = re.compile(
@@ -351,8 +352,7 @@ def _performs_a_leap(found: re.Match[str]) -> str:
 
 def _climbs(found: re.Match[str]) -> str:
     """Return a climb in the form of the verb that is found."""
-    end = (found["end"] or found["ends"] or "").lower()
-    return f"climb{'ing' if end.endswith('ing') else 's' if end.endswith('s') else ''}{found['how']}"
+    return f"{in_form_of(found['end'] or found['ends'] or '', 'climb')}{found['how']}"
 
 
 def _on_floor(found: re.Match[str]) -> str:
@@ -365,17 +365,15 @@ def _on_floor(found: re.Match[str]) -> str:
 def _with_turn(found: re.Match[str]) -> str:
     """Return a jump with the turn that it makes."""
     jump = found["jump"]
-    turn = "turning" if jump.lower().endswith("ing") else "turns" if jump.lower().endswith("s") else "turn"
-    return f"{jump} and {turn} {found['degrees'] or 180} degrees in the air"
+    return f"{jump} and {in_form_of(jump, 'turn')} {found['degrees'] or 180} degrees in the air"
 
 
 def _strikes_back(found: re.Match[str]) -> str:
     """Return a counterattack as a blow of the weapon that its prompt names."""
-    end = next((end for end in ("ing", "s") if found[0].lower().endswith(end)), "")
     if _BLADE.search(found.string):
         said = "" if found.string[found.end() :].startswith(" with ") else " with the sword"
-        return f"slash{'es' if end == 's' else end}{said}"
-    return f"throw{end} a punch"
+        return f"{in_form_of(found[0], 'slash')}{said}"
+    return f"{in_form_of(found[0], 'throw')} a punch"
 
 
 def _lies(found: re.Match[str]) -> str:
@@ -402,8 +400,7 @@ def _falls_over_knees(found: re.Match[str]) -> str:
 
 def _kneels(found: re.Match[str]) -> str:
     """Return a body that kneels down on both knees; one that falls does so quickly."""
-    end = (found["end"] or "").lower()
-    kneels = "kneeling" if end == "ing" else "kneels" if end.endswith("s") else "kneel"
+    kneels = in_form_of(found["end"] or "", "kneel")
     how = found["how"] or (" quickly" if found["fast"] else "")
     return f"{kneels} down{how} on both knees"
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 
+from marey.vocabulary.inflection import in_form_of
+
 _TAKES_A_LEFT = re.compile(
     r"""\b(?:take|make|hang|do)(?P<s>s)?\ (?P<how>an?\ (?:[\w-]+\ )?)(?P<side>left|right)
     (?=\W*$|[.,;]|\ (?:at|into|onto|around|round|down|up|along|past|towards?
@@ -53,8 +55,7 @@ def _s(found: re.Match[str]) -> str:
 
 def _turns(found: re.Match[str]) -> str:
     """Return a quick turn to face back, in the form of the verb that is found."""
-    end = (found["s"] or "").lower()
-    return f"turn{'ing' if end.endswith('ing') else end} around quickly"
+    return f"{in_form_of(found['s'] or '', 'turn')} around quickly"
 
 
 def _faces_about(found: re.Match[str]) -> str:

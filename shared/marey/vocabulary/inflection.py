@@ -165,3 +165,9 @@ def _stems(base: str) -> set[str]:
     if base.endswith(("al", "el", "il", "ap", "ip", "op")) and not base.endswith(("eal", "eel", "ail", "oil", "oop")):
         return {base, doubled}
     return {base}
+
+
+def in_form_of(said: str, verb: str) -> str:
+    """Return a verb in the form of another one, or of its ending: in -ing, in the third person, or as it is."""
+    end = said.lower()
+    return gerund(verb) if end.endswith("ing") else third_person(verb) if end.endswith("s") else verb

@@ -11,7 +11,6 @@ from marey.drawing.postures import FootPlace, HandPlace, Point, Posture
 from marey.drawing.sequels import Sequel, both
 from marey.posing.standing import LEFT, RIGHT
 
-_DOWN: Point = (0.5, -1.0, -0.2)
 _SHELVES = {"high": 0.3, "": 0.06, "low": -0.22}
 """Metres of the wrists over the shoulders when the load is put down."""
 

@@ -11,17 +11,11 @@ from dataclasses import replace
 
 from marey.drawing.flights import StandingFeet, come_together, on_feet, stride_ahead
 from marey.drawing.gesture import Gesture
-from marey.drawing.postures import HandPlace, Point, Posture
+from marey.drawing.postures import ELBOW_BACK, ELBOW_DOWN, ELBOW_OUT, LOWERED, TUCKED, HandPlace, Posture
 from marey.drawing.sequels import Sequel
 from marey.posing.standing import LEFT, RIGHT
 
-_OUT: Point = (1.0, -0.4, -0.2)
-_DOWN: Point = (0.5, -1.0, -0.2)
-_BACK: Point = (0.6, -0.3, -0.9)
-_UP: Point = (0.7, 0.8, 0.3)
-_LOWERED = HandPlace((0.1, -0.44, 0.12), "shoulder", _BACK)
-_POINTING = HandPlace((0.04, 0.06, 0.47), "shoulder", _DOWN)
-_TUCKED = HandPlace((0.02, -0.3, 0.2), "shoulder", _BACK)
+_POINTING = HandPlace((0.04, 0.06, 0.47), "shoulder", ELBOW_DOWN)
 
 
 def field_throw(rng: random.Random, form: str, side: str = "") -> Gesture:
@@ -42,7 +36,7 @@ def field_throw(rng: random.Random, form: str, side: str = "") -> Gesture:
 
 def _javelin(rng: random.Random) -> Callable[[StandingFeet], Sequel]:
     pace, step, starts = rng.uniform(0.95, 1.1), rng.uniform(0.5, 0.58), rng.uniform(0.2, 0.4)
-    drawn = HandPlace((0.2, 0.12, -0.44), "shoulder", _OUT)
+    drawn = HandPlace((0.2, 0.12, -0.44), "shoulder", ELBOW_OUT)
     carried = HandPlace((0.12, 0.2, -0.06), "shoulder", (1.0, -0.2, -0.3))
 
     def way(
@@ -67,7 +61,7 @@ def _javelin(rng: random.Random) -> Callable[[StandingFeet], Sequel]:
             (-16, -6, 0),
             (-4, 0, 0),
             hands={
-                LEFT: HandPlace((0.14, -0.14, 0.3), "shoulder", _BACK),
+                LEFT: HandPlace((0.14, -0.14, 0.3), "shoulder", ELBOW_BACK),
                 RIGHT: HandPlace((0.24, 0.2, -0.22), "shoulder", (1.0, 0.4, 0.2)),
             },
             feet=planted,
@@ -77,14 +71,14 @@ def _javelin(rng: random.Random) -> Callable[[StandingFeet], Sequel]:
             pelvis=(0.0, 0.92, ends - 0.1),
             tilt=(10, 0, 12),
             spine=(12, -8, 12),
-            hands={LEFT: _TUCKED, RIGHT: HandPlace((0.0, 0.36, 0.34), "shoulder", _OUT)},
+            hands={LEFT: TUCKED, RIGHT: HandPlace((0.0, 0.36, 0.34), "shoulder", ELBOW_OUT)},
         )
         stopped = Posture(
             (0.0, 0.84, ends + 0.24),
             (20, 0, 20),
             (22, 0, 18),
             (-26, 0, -14),
-            hands={LEFT: _TUCKED, RIGHT: HandPlace((-0.26, -0.4, 0.24), "shoulder", _OUT)},
+            hands={LEFT: TUCKED, RIGHT: HandPlace((-0.26, -0.4, 0.24), "shoulder", ELBOW_OUT)},
             feet={LEFT: feet[LEFT].tiptoe(40, ends), RIGHT: feet[RIGHT].flat(ends + 0.5)},
         )
         done.then(0.2, bow)
@@ -105,8 +99,8 @@ def _discus(rng: random.Random) -> Callable[[StandingFeet], Sequel]:
 
         def wound(share: float) -> Posture:
             hands = {
-                LEFT: HandPlace((-0.12, -0.06, 0.36), "trunk", _OUT),
-                RIGHT: HandPlace((0.46, -0.2, -0.3 * share), "trunk", _DOWN),
+                LEFT: HandPlace((-0.12, -0.06, 0.36), "trunk", ELBOW_OUT),
+                RIGHT: HandPlace((0.46, -0.2, -0.3 * share), "trunk", ELBOW_DOWN),
             }
             return Posture(
                 (-0.1 * share, 0.93 - 0.13 * share, 0.0),
@@ -123,8 +117,8 @@ def _discus(rng: random.Random) -> Callable[[StandingFeet], Sequel]:
             (6, 0, 26),
             (-6, 0, 0),
             hands={
-                LEFT: HandPlace((0.34, -0.16, 0.2), "trunk", _DOWN),
-                RIGHT: HandPlace((-0.14, -0.16, 0.36), "trunk", _OUT),
+                LEFT: HandPlace((0.34, -0.16, 0.2), "trunk", ELBOW_DOWN),
+                RIGHT: HandPlace((-0.14, -0.16, 0.36), "trunk", ELBOW_OUT),
             },
             feet=stance,
         )
@@ -134,8 +128,8 @@ def _discus(rng: random.Random) -> Callable[[StandingFeet], Sequel]:
             (-10, 0, 10),
             (-6, 0, -30),
             hands={
-                LEFT: HandPlace((0.3, -0.3, -0.1), "trunk", _BACK),
-                RIGHT: HandPlace((0.36, 0.1, 0.34), "trunk", _DOWN),
+                LEFT: HandPlace((0.3, -0.3, -0.1), "trunk", ELBOW_BACK),
+                RIGHT: HandPlace((0.36, 0.1, 0.34), "trunk", ELBOW_DOWN),
             },
             feet=turned,
         )
@@ -145,8 +139,8 @@ def _discus(rng: random.Random) -> Callable[[StandingFeet], Sequel]:
             spine=(4, 0, 34),
             neck=(0, 0, -44),
             hands={
-                LEFT: HandPlace((0.32, -0.3, -0.1), "trunk", _BACK),
-                RIGHT: HandPlace((-0.16, 0.14, 0.4), "trunk", _OUT),
+                LEFT: HandPlace((0.32, -0.3, -0.1), "trunk", ELBOW_BACK),
+                RIGHT: HandPlace((-0.16, 0.14, 0.4), "trunk", ELBOW_OUT),
             },
         )
         done = Sequel([starts])
@@ -168,14 +162,14 @@ def _shot(rng: random.Random) -> Callable[[StandingFeet], Sequel]:
     neck = HandPlace((-0.06, 0.05, 0.13), "shoulder", (1.0, -0.3, -0.2))
 
     def sequel(feet: StandingFeet) -> Sequel:
-        held = Posture((0.0, 0.93, 0.0), (4, 0, -10), (0, 0, -10), hands={RIGHT: neck, LEFT: _LOWERED})
+        held = Posture((0.0, 0.93, 0.0), (4, 0, -10), (0, 0, -10), hands={RIGHT: neck, LEFT: LOWERED})
         stance = {LEFT: feet[LEFT].flat(stride), RIGHT: feet[RIGHT].flat(-0.08)}
         crouched = Posture(
             (-0.06, 0.78, 0.02),
             (16, 0, -46),
             (16, 0, -36),
             (-10, 0, 20),
-            hands={RIGHT: neck, LEFT: HandPlace((-0.1, -0.06, 0.38), "trunk", _OUT)},
+            hands={RIGHT: neck, LEFT: HandPlace((-0.1, -0.06, 0.38), "trunk", ELBOW_OUT)},
             feet=stance,
         )
         drives = Posture(
@@ -183,7 +177,7 @@ def _shot(rng: random.Random) -> Callable[[StandingFeet], Sequel]:
             (-8, 0, -10),
             (-8, 0, -6),
             (-14, 0, 10),
-            hands={RIGHT: neck, LEFT: HandPlace((0.3, 0.0, 0.24), "trunk", _DOWN)},
+            hands={RIGHT: neck, LEFT: HandPlace((0.3, 0.0, 0.24), "trunk", ELBOW_DOWN)},
             feet=stride_ahead(feet, stride, heel=30, rear=-0.08),
         )
         let_go = Posture(
@@ -191,7 +185,7 @@ def _shot(rng: random.Random) -> Callable[[StandingFeet], Sequel]:
             (0, 0, 26),
             (-2, -8, 22),
             (-16, 0, -30),
-            hands={RIGHT: HandPlace((-0.02, 0.3, 0.4), "shoulder", _OUT), LEFT: _TUCKED},
+            hands={RIGHT: HandPlace((-0.02, 0.3, 0.4), "shoulder", ELBOW_OUT), LEFT: TUCKED},
             feet=stride_ahead(feet, stride, heel=52, rear=0.0),
         )
         stopped = Posture(
@@ -199,7 +193,7 @@ def _shot(rng: random.Random) -> Callable[[StandingFeet], Sequel]:
             (18, 0, 24),
             (14, 0, 16),
             (-20, 0, -24),
-            hands={RIGHT: HandPlace((-0.1, -0.08, 0.42), "shoulder", _OUT), LEFT: _TUCKED},
+            hands={RIGHT: HandPlace((-0.1, -0.08, 0.42), "shoulder", ELBOW_OUT), LEFT: TUCKED},
             feet={LEFT: feet[LEFT].tiptoe(40, stride), RIGHT: feet[RIGHT].flat(stride + 0.34)},
         )
         done = Sequel([starts])
@@ -223,8 +217,8 @@ def _frisbee(rng: random.Random) -> Callable[[StandingFeet], Sequel]:
             (4, 0, 12),
             (2, 0, 10),
             hands={
-                RIGHT: HandPlace((-0.12, -0.28, 0.3), "shoulder", _OUT),
-                LEFT: HandPlace((-0.04, -0.3, 0.3), "shoulder", _DOWN),
+                RIGHT: HandPlace((-0.12, -0.28, 0.3), "shoulder", ELBOW_OUT),
+                LEFT: HandPlace((-0.04, -0.3, 0.3), "shoulder", ELBOW_DOWN),
             },
         )
         wound = Posture(
@@ -232,7 +226,7 @@ def _frisbee(rng: random.Random) -> Callable[[StandingFeet], Sequel]:
             (8, 0, 38),
             (8, 0, 38),
             (-6, 0, -54),
-            hands={RIGHT: HandPlace((-0.34, -0.26, 0.16), "trunk", _OUT), LEFT: _LOWERED},
+            hands={RIGHT: HandPlace((-0.34, -0.26, 0.16), "trunk", ELBOW_OUT), LEFT: LOWERED},
             feet=stance,
         )
         let_go = Posture(
@@ -241,8 +235,8 @@ def _frisbee(rng: random.Random) -> Callable[[StandingFeet], Sequel]:
             (4, 0, -8),
             (-4, 0, 4),
             hands={
-                RIGHT: HandPlace((0.1, -0.14, 0.46), "shoulder", _OUT),
-                LEFT: HandPlace((0.24, -0.36, -0.08), "shoulder", _BACK),
+                RIGHT: HandPlace((0.1, -0.14, 0.46), "shoulder", ELBOW_OUT),
+                LEFT: HandPlace((0.24, -0.36, -0.08), "shoulder", ELBOW_BACK),
             },
             feet={RIGHT: stance[RIGHT], LEFT: feet[LEFT].tiptoe(30)},
         )
@@ -251,7 +245,7 @@ def _frisbee(rng: random.Random) -> Callable[[StandingFeet], Sequel]:
             tilt=(2, 0, -8),
             spine=(2, 0, -20),
             neck=(-4, 0, 22),
-            hands={RIGHT: HandPlace((0.36, 0.02, 0.3), "shoulder", _DOWN), LEFT: let_go.hands[LEFT]},
+            hands={RIGHT: HandPlace((0.36, 0.02, 0.3), "shoulder", ELBOW_DOWN), LEFT: let_go.hands[LEFT]},
         )
         done = Sequel([starts])
         done.then(0.6 * pace, held, 0.25)

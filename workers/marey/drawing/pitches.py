@@ -7,18 +7,15 @@ from collections.abc import Callable
 
 from marey.drawing.flights import StandingFeet, on_feet
 from marey.drawing.gesture import Gesture
-from marey.drawing.postures import FootPlace, HandPlace, Point, Posture
+from marey.drawing.postures import ELBOW_BACK, ELBOW_DOWN, ELBOW_OUT, FootPlace, HandPlace, Posture
 from marey.drawing.sequels import Sequel
 from marey.posing.standing import LEFT, RIGHT
 
-_DOWN: Point = (0.5, -1.0, -0.2)
-_OUT: Point = (1.0, -0.4, -0.2)
-_BACK: Point = (0.6, -0.3, -0.9)
 _SIDEWAYS = -78.0
 """Degrees by which a body that throws with the right hand has turned to its right when the leg is up."""
-_TUCKED = HandPlace((0.02, -0.26, 0.16), "trunk", _BACK)
-_GLOVE = HandPlace((-0.16, -0.14, 0.26), "trunk", _DOWN)
-_BALL = HandPlace((-0.14, -0.12, 0.24), "trunk", _DOWN)
+_TUCKED = HandPlace((0.02, -0.26, 0.16), "trunk", ELBOW_BACK)
+_GLOVE = HandPlace((-0.16, -0.14, 0.26), "trunk", ELBOW_DOWN)
+_BALL = HandPlace((-0.14, -0.12, 0.24), "trunk", ELBOW_DOWN)
 
 
 def pitch(rng: random.Random, side: str = "") -> Gesture:
@@ -57,8 +54,8 @@ def _pitched(stride: float, pace: float, starts: float, knee: float) -> Callable
             knees={LEFT: (-0.7, 0.5, 0.5), RIGHT: (0.9, 0.0, 0.3)},
         )
         parted = {
-            RIGHT: HandPlace((0.42, -0.24, -0.14), "trunk", _OUT),
-            LEFT: HandPlace((0.44, -0.06, 0.06), "trunk", _OUT),
+            RIGHT: HandPlace((0.42, -0.24, -0.14), "trunk", ELBOW_OUT),
+            LEFT: HandPlace((0.44, -0.06, 0.06), "trunk", ELBOW_OUT),
         }
         strides = Posture(
             (-0.04, 0.83, 0.3 * stride),
@@ -77,7 +74,7 @@ def _pitched(stride: float, pace: float, starts: float, knee: float) -> Callable
             (-4, 0, 62),
             hands={
                 RIGHT: HandPlace((0.26, 0.24, -0.18), "trunk", (1.0, 0.0, -0.1)),
-                LEFT: HandPlace((0.1, -0.04, 0.42), "trunk", _OUT),
+                LEFT: HandPlace((0.1, -0.04, 0.42), "trunk", ELBOW_OUT),
             },
             feet=planted,
         )
@@ -87,7 +84,7 @@ def _pitched(stride: float, pace: float, starts: float, knee: float) -> Callable
             (22, 0, 8),
             (18, -10, 10),
             (-26, 0, -6),
-            hands={RIGHT: HandPlace((0.08, 0.36, 0.36), "shoulder", _OUT), LEFT: _TUCKED},
+            hands={RIGHT: HandPlace((0.08, 0.36, 0.36), "shoulder", ELBOW_OUT), LEFT: _TUCKED},
             feet=toes,
         )
         through = Posture(
@@ -95,7 +92,7 @@ def _pitched(stride: float, pace: float, starts: float, knee: float) -> Callable
             (34, 0, 24),
             (30, -4, 22),
             (-46, 0, -24),
-            hands={RIGHT: HandPlace((-0.16, -0.3, 0.38), "shoulder", _OUT), LEFT: _TUCKED},
+            hands={RIGHT: HandPlace((-0.16, -0.3, 0.38), "shoulder", ELBOW_OUT), LEFT: _TUCKED},
             feet={LEFT: planted[LEFT], RIGHT: FootPlace((0.1, 0.42, 0.24), (0.1, -0.9, 0.1))},
         )
         follows = Posture(
@@ -103,7 +100,7 @@ def _pitched(stride: float, pace: float, starts: float, knee: float) -> Callable
             (20, 0, 14),
             (18, 0, 12),
             (-28, 0, -12),
-            hands={RIGHT: HandPlace((-0.14, -0.4, 0.24), "shoulder", _OUT), LEFT: _TUCKED},
+            hands={RIGHT: HandPlace((-0.14, -0.4, 0.24), "shoulder", ELBOW_OUT), LEFT: _TUCKED},
             feet={LEFT: planted[LEFT], RIGHT: feet[RIGHT].flat(stride + 0.12)},
         )
         done = Sequel([starts])

@@ -70,6 +70,14 @@ class Posture:
 
 STAND = Posture()
 
+ELBOW_OUT: Point = (1.0, -0.4, -0.2)
+ELBOW_DOWN: Point = (0.5, -1.0, -0.2)
+ELBOW_BACK: Point = (0.6, -0.3, -0.9)
+"""Where elbows point in throws, strokes and loads."""
+LOWERED = HandPlace((0.1, -0.44, 0.12), "shoulder", ELBOW_BACK)
+TUCKED = HandPlace((0.02, -0.3, 0.2), "shoulder", ELBOW_BACK)
+"""A hand that hangs, and one that is held before the belly, of who strikes or throws with the other."""
+
 
 def mirrored(posture: Posture) -> Posture:
     """Exchange left and right."""

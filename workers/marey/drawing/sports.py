@@ -10,17 +10,19 @@ from dataclasses import replace
 
 from marey.drawing.flights import StandingFeet, come_together, fly, on_feet, stride_ahead
 from marey.drawing.gesture import Gesture
-from marey.drawing.postures import FootPlace, HandPlace, Point, Posture
+from marey.drawing.postures import (
+    ELBOW_BACK,
+    ELBOW_DOWN,
+    ELBOW_OUT,
+    LOWERED,
+    TUCKED,
+    FootPlace,
+    HandPlace,
+    Point,
+    Posture,
+)
 from marey.drawing.sequels import Sequel, both
 from marey.posing.standing import LEFT, RIGHT
-
-_OUT: Point = (1.0, -0.4, -0.2)
-_DOWN: Point = (0.5, -1.0, -0.2)
-_BACK: Point = (0.6, -0.3, -0.9)
-_UP: Point = (0.7, 0.8, 0.3)
-_LOWERED = HandPlace((0.1, -0.44, 0.12), "shoulder", _BACK)
-_POINTING = HandPlace((0.04, 0.06, 0.47), "shoulder", _DOWN)
-_TUCKED = HandPlace((0.02, -0.3, 0.2), "shoulder", _BACK)
 
 
 def tennis_serve(rng: random.Random, side: str = "") -> Gesture:
@@ -41,8 +43,8 @@ def tennis_serve(rng: random.Random, side: str = "") -> Gesture:
             (6, 0, -0.4 * turn),
             (0, 0, 0.7 * turn),
             hands={
-                LEFT: HandPlace((-0.1, -0.22, 0.36), "shoulder", _DOWN),
-                RIGHT: HandPlace((-0.12, -0.24, 0.32), "shoulder", _DOWN),
+                LEFT: HandPlace((-0.1, -0.22, 0.36), "shoulder", ELBOW_DOWN),
+                RIGHT: HandPlace((-0.12, -0.24, 0.32), "shoulder", ELBOW_DOWN),
             },
             feet=stance,
         )
@@ -50,8 +52,8 @@ def tennis_serve(rng: random.Random, side: str = "") -> Gesture:
             ready,
             pelvis=(0.0, 0.92, 0.35 * stride),
             hands={
-                LEFT: HandPlace((0.02, -0.44, 0.18), "shoulder", _DOWN),
-                RIGHT: HandPlace((0.2, -0.42, -0.08), "shoulder", _BACK),
+                LEFT: HandPlace((0.02, -0.44, 0.18), "shoulder", ELBOW_DOWN),
+                RIGHT: HandPlace((0.2, -0.42, -0.08), "shoulder", ELBOW_BACK),
             },
         )
         trophy = Posture(
@@ -60,7 +62,7 @@ def tennis_serve(rng: random.Random, side: str = "") -> Gesture:
             (-10, 6, -0.6 * turn),
             (-22, 0, 0.7 * turn),
             hands={
-                LEFT: HandPlace((-0.02, 0.48, 0.12), "shoulder", _DOWN),
+                LEFT: HandPlace((-0.02, 0.48, 0.12), "shoulder", ELBOW_DOWN),
                 RIGHT: HandPlace((0.24, 0.1, -0.16), "shoulder", (1.0, -0.1, -0.6)),
             },
             feet=stance,
@@ -70,7 +72,7 @@ def tennis_serve(rng: random.Random, side: str = "") -> Gesture:
             pelvis=(0.0, 0.91, 0.7 * stride),
             spine=(-12, 6, -0.4 * turn),
             hands={
-                LEFT: HandPlace((0.0, 0.3, 0.34), "shoulder", _DOWN),
+                LEFT: HandPlace((0.0, 0.3, 0.34), "shoulder", ELBOW_DOWN),
                 RIGHT: HandPlace((0.04, 0.1, -0.2), "shoulder", (1.0, 0.7, 0.1)),
             },
         )
@@ -80,7 +82,7 @@ def tennis_serve(rng: random.Random, side: str = "") -> Gesture:
             (4, 0, 4),
             (6, -10, 12),
             (-16, 0, -8),
-            hands={LEFT: _TUCKED, RIGHT: HandPlace((-0.02, 0.5, 0.1), "shoulder", _OUT)},
+            hands={LEFT: TUCKED, RIGHT: HandPlace((-0.02, 0.5, 0.1), "shoulder", ELBOW_OUT)},
             feet=raised,
         )
         through = replace(
@@ -88,14 +90,14 @@ def tennis_serve(rng: random.Random, side: str = "") -> Gesture:
             tilt=(14, 0, 14),
             spine=(16, 0, 18),
             neck=(-10, 0, -10),
-            hands={LEFT: _TUCKED, RIGHT: HandPlace((-0.02, 0.08, 0.46), "shoulder", _OUT)},
+            hands={LEFT: TUCKED, RIGHT: HandPlace((-0.02, 0.08, 0.46), "shoulder", ELBOW_OUT)},
         )
         stopped = Posture(
             (0.0, 0.89, 1.0 * stride),
             (14, 0, 22),
             (18, 0, 24),
             (-18, 0, -18),
-            hands={LEFT: _TUCKED, RIGHT: HandPlace((-0.32, -0.36, 0.24), "shoulder", _OUT)},
+            hands={LEFT: TUCKED, RIGHT: HandPlace((-0.32, -0.36, 0.24), "shoulder", ELBOW_OUT)},
             feet=stride_ahead(feet, stride, heel=45),
         )
         done = Sequel([starts])
@@ -119,11 +121,11 @@ def bowling(rng: random.Random, side: str = "") -> Gesture:
         side: of the hand; empty = right.
     """
     pace, step, starts = rng.uniform(0.95, 1.1), rng.uniform(0.4, 0.46), rng.uniform(0.2, 0.4)
-    aside = HandPlace((0.3, -0.34, 0.1), "shoulder", _DOWN)
-    held = HandPlace((-0.1, -0.3, 0.26), "shoulder", _BACK)
-    ahead = HandPlace((0.0, -0.34, 0.36), "shoulder", _DOWN)
-    below = HandPlace((0.04, -0.5, 0.02), "shoulder", _BACK)
-    behind = HandPlace((0.08, -0.26, -0.42), "shoulder", _BACK)
+    aside = HandPlace((0.3, -0.34, 0.1), "shoulder", ELBOW_DOWN)
+    held = HandPlace((-0.1, -0.3, 0.26), "shoulder", ELBOW_BACK)
+    ahead = HandPlace((0.0, -0.34, 0.36), "shoulder", ELBOW_DOWN)
+    below = HandPlace((0.04, -0.5, 0.02), "shoulder", ELBOW_BACK)
+    behind = HandPlace((0.08, -0.26, -0.42), "shoulder", ELBOW_BACK)
 
     def sequel(feet: StandingFeet) -> Sequel:
         def way(left: float, right: float, hand: HandPlace, low: float, lean: float, heel: str) -> Posture:
@@ -141,17 +143,17 @@ def bowling(rng: random.Random, side: str = "") -> Gesture:
             (22, 0, 0),
             (20, -4, 0),
             (-30, 0, 0),
-            hands={RIGHT: HandPlace((0.04, -0.5, 0.06), "shoulder", _BACK), LEFT: aside},
+            hands={RIGHT: HandPlace((0.04, -0.5, 0.06), "shoulder", ELBOW_BACK), LEFT: aside},
             feet=slid,
         )
-        rolled = replace(low, hands={RIGHT: HandPlace((0.0, -0.24, 0.43), "shoulder", _DOWN), LEFT: aside})
+        rolled = replace(low, hands={RIGHT: HandPlace((0.0, -0.24, 0.43), "shoulder", ELBOW_DOWN), LEFT: aside})
         through = replace(
             low,
             pelvis=(0.02, 0.7, ends - 0.24),
             tilt=(14, 0, 4),
             spine=(12, 0, 4),
             neck=(-18, 0, 0),
-            hands={RIGHT: HandPlace((-0.04, 0.2, 0.42), "shoulder", _DOWN), LEFT: aside},
+            hands={RIGHT: HandPlace((-0.04, 0.2, 0.42), "shoulder", ELBOW_DOWN), LEFT: aside},
         )
         done = Sequel([starts])
         done.then(0.6 * pace, way(0.0, 0.0, held, 0.92, 6, ""), 0.3)
@@ -176,14 +178,14 @@ def jump_shot(rng: random.Random, side: str = "", times: int | None = None) -> G
         times: how many; None = one.
     """
     pace, flight, starts, times = rng.uniform(0.95, 1.1), rng.uniform(0.46, 0.54), rng.uniform(0.2, 0.4), times or 1
-    low = both(HandPlace((-0.04, -0.26, 0.26), "shoulder", _DOWN))
+    low = both(HandPlace((-0.04, -0.26, 0.26), "shoulder", ELBOW_DOWN))
     over = {
         RIGHT: HandPlace((-0.04, 0.3, 0.14), "shoulder", (0.6, 0.1, 1.0)),
         LEFT: HandPlace((-0.06, 0.28, 0.16), "shoulder", (1.0, 0.1, 0.5)),
     }
     shot = {
-        RIGHT: HandPlace((-0.04, 0.4, 0.28), "shoulder", _OUT),
-        LEFT: HandPlace((-0.02, 0.28, 0.22), "shoulder", _OUT),
+        RIGHT: HandPlace((-0.04, 0.4, 0.28), "shoulder", ELBOW_OUT),
+        LEFT: HandPlace((-0.02, 0.28, 0.22), "shoulder", ELBOW_OUT),
     }
 
     def sequel(feet: StandingFeet) -> Sequel:
@@ -204,7 +206,7 @@ def jump_shot(rng: random.Random, side: str = "", times: int | None = None) -> G
             fly(done, flight, leaves, lands, shaped)
             flat = {one: foot.flat() for one, foot in feet.items()}
             done.then(0.18, Posture((0.0, 0.84, 0.0), (8, 0, 0), (6, 0, 0), (-14, 0, 0), hands=shot, feet=flat))
-            done.then(0.34, Posture((0.0, 0.92, 0.0), hands=both(_LOWERED), feet=flat))
+            done.then(0.34, Posture((0.0, 0.92, 0.0), hands=both(LOWERED), feet=flat))
         return come_together(done, feet)
 
     told = ["jump-shot"]
@@ -226,12 +228,12 @@ def fencing_lunge(
     steps = 2 if advances or (advances is None and rng.random() < 0.6) else 0
     far = rng.uniform(0.44, 0.5)
     guard = {
-        RIGHT: HandPlace((0.02, -0.12, 0.36), "shoulder", _DOWN),
+        RIGHT: HandPlace((0.02, -0.12, 0.36), "shoulder", ELBOW_DOWN),
         LEFT: HandPlace((0.1, 0.22, -0.22), "shoulder", (0.5, -0.1, -1.0)),
     }
     thrust = {
-        RIGHT: HandPlace((-0.02, 0.03, 0.49), "shoulder", _DOWN),
-        LEFT: HandPlace((0.12, -0.18, -0.42), "shoulder", _DOWN),
+        RIGHT: HandPlace((-0.02, 0.03, 0.49), "shoulder", ELBOW_DOWN),
+        LEFT: HandPlace((0.12, -0.18, -0.42), "shoulder", ELBOW_DOWN),
     }
     rear: Point = (0.98, -0.05, 0.15)
 

@@ -60,11 +60,8 @@ stand up or to go down at this speed."""
 
 BENT, LOWER = frozenset({"bend-over"}), frozenset({KNEES, KNEE, FLOOR, BACK, FRONT, CROUCH, FOURS})
 """Actions from whose bent trunk a body goes on down, and the postures that it comes to."""
-
-
 STRUCK = frozenset({"flinch"})
 """Actions of who is hit: that bends a body, which then bends on."""
-"""Drawn movements that go out of a walk or run, and out of a run alone."""
 
 
 @dataclass(frozen=True, eq=False)
