@@ -49,6 +49,11 @@ _PURPOSE = re.compile(
 _NOT_DONE = re.compile(r"\b(?:not|never|no|nobody|nothing|cannot|without)\b|n't\b", re.IGNORECASE)
 _BY_THEMSELVES = re.compile(r"(?:he|she|they|it)\b", re.IGNORECASE)
 _TITLE = re.compile(r"^(?P<title>[^:.;,!?]{2,80}):\s+(?P<said>\S.*)$", re.DOTALL)
+_EVENT = re.compile(
+    r"^(?:[\w-]+ ){0,2}(?P<event>death|demise|patrol|collapse|knock-?down),\s+(?P<said>(?!then\b|and\b)\S.*)$",
+    re.IGNORECASE | re.DOTALL,
+)
+"""An event that names what is told behind it: "death, shot in the chest, falls backward"."""
 _WISH = re.compile(
     r"""^(?:(?:ok(?:ay)?|hi|hello|hey|please|so|now)\ )*
     (?:(?:we|i|you)(?:\ (?:need|want|are|have)|'d|'re|'ll|\ would|\ could|\ will)\b
@@ -128,6 +133,9 @@ def _without_aim(found: re.Match[str]) -> str:
 
 def _without_title(text: str) -> str:
     """Return a text without the words before a colon that only name what comes: "Comedy bit:", "I need a loop:"."""
+    event = _EVENT.match(text)
+    if event is not None and named_actions(event["event"]) & named_actions(event["said"]):
+        return event["said"]
     found = _TITLE.match(text)
     if found is None:
         return text

@@ -77,6 +77,17 @@ _STOPS = re.compile(
 )
 """The same of one that comes to rest: "walk stop", "run to idle"."""
 _THEN = ", then "
+_COUNTED_AND_MORE = re.compile(
+    rf"""\b(?P<verb>[a-z]+)(?P<number>\ {_NUMBER})(?P<how>(?:\ (?!(?:and|then|more)\b)[a-z-]+){{0,2}}?)
+    \ (?P<noun>(?!(?:times|seconds|minutes|met(?:er|re)s|feet|yards|degrees)\b)[a-z-]+s)\b
+    (?P<between>[^.;]*?(?:,|\band|\bthen)\ )
+    (?:(?P<again>tak|do|mak|throw|perform|land|execut)(?:e?s|es|ing|e)?\ )?
+    (?P<more>(?:another\ )?(?:{_NUMBER}|one|a\ few)(?:\ more)?)
+    (?=\W*$|[,.;]|\ (?:and|then|to|back|forwards?|backwards?|left|right|in|with|on)\b)""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""A count of something, and another without its name: "takes four steps, turns left and takes two more"."""
+_PLURAL = re.compile(r"(?<=[cs]h)es$|(?<=[sx])es$|s$")
 _RESTS = re.compile(
     r"(?:stand|stop|halt|rest|wait|pause)s?(?: (?:still|there|up|straight|upright|again))*\W*$", re.IGNORECASE
 )
@@ -104,8 +115,20 @@ def parts_by_sides(prompt: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
 def with_elided(prompt: str) -> str:
     """Return a prompt with the words that it leaves out: "points left, then points right" of "points left, then right",
     "stands still, then walks" of "walk start". Any other prompt is returned as it is."""
-    prompt = _PLACES.sub(_pointed_again, prompt)
+    prompt = _COUNTED_AND_MORE.sub(_counted_again, _PLACES.sub(_pointed_again, prompt))
     return _OTHER_SIDE.sub(_said_again, _STOPS.sub(_stopping, _STARTS.sub(_starting, prompt)))
+
+
+def _counted_again(found: re.Match[str]) -> str:
+    """Return what is counted, with its name where it is counted again."""
+    more = found["more"].lower()
+    if "more" not in more and "another" not in more:
+        return found[0]
+    verb = "" if found["again"] else f"{found['verb'].lower()} "
+    noun = found["noun"].lower()
+    if re.match(r"(?:another )?(?:one|1)\b", more):
+        noun = _PLURAL.sub("", noun)
+    return f"{found[0][: found.start('more') - found.start()]}{verb}{more} {noun}"
 
 
 def _pointed_again(found: re.Match[str]) -> str:

@@ -1,4 +1,5 @@
-"""Feet that slip or trip, told as the fall that they end in: "slips on a banana peel", "trips over a log"."""
+"""Feet that slip or trip, and bodies that are knocked down, told as the fall that they end in: "trips over a log", "is
+knocked to the ground"."""
 
 from __future__ import annotations
 
@@ -44,6 +45,31 @@ _TRIPS = re.compile(
     re.IGNORECASE | re.VERBOSE,
 )
 """Feet that are held by what is before them."""
+_TO_THE_FLOOR = r"""(?:(?:right|clean|flat|hard)\ )?(?:down|over|flat|flying
+    |(?:clear\ |clean\ )?off\ (?:his|her|their|the)\ feet|(?:to|on|onto)\ (?:his|her|their)\ back
+    |(?:down\ )?(?:to|on|onto|against)\ the\ (?:ground|floor|mat|deck|canvas|pavement))"""
+_FAR = r"(?:\ (?P<far>backwards?|forwards?|sideways|to\ the\ (?:left|right|side)))"
+_ENDS = r"(?=\W*$|[,.;]|\ (?:and|then|but|before)\b)"
+_BY = rf"(?:\ (?:by|from|in|with)\ (?:(?!(?:and|then|but|before)\b)[\w'-]+\ ?)+?{_ENDS})"
+_DOWNED = re.compile(
+    rf"""\b(?:is|are|was|were|gets?|getting|got|being|be)\ (?:(?:\w+ly|just|then)\ )?
+    (?:(?:knocked|pushed|shoved|kicked|punched|struck|blown|bowled|taken|tackled|thrown|flung|hurled|slammed|swept
+    |pulled|dragged|brought){_FAR}?\ {_TO_THE_FLOOR}
+    |(?:thrown|flung|hurled|blown|blasted)(?P<away>\ (?:backwards?|forwards?))
+    (?=\W*$|[,.;]|\ (?:by|from|in|and|then)\b)
+    |floored|flattened|felled|decked|tackled){_BY}?""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""A body that another, or a blast, brings down: "gets knocked over", "is thrown backwards by an explosion"."""
+_FORCE = r"""(?:blasts?|explosions?|shock\ ?waves?|waves?|winds?|gusts?|force|impacts?|hits?|punch|blow|kick
+    |shots?|bullets?|recoil|tackle|ball|car|truck|grenade|bomb|rocket)"""
+_DOWNS = re.compile(
+    rf"""(?:^|(?<=[.;,]\ ))(?:an?|the|his|her|another)\ (?:[\w-]+\ ){{0,3}}?{_FORCE}
+    \ (?:knocks|pushes|blows|throws|flings|hurls|slams|sweeps|sends|takes|brings)\ (?P<whom>him|her|them)
+    {_FAR}?\ (?:{_TO_THE_FLOOR}|(?:sprawling|tumbling|crashing)(?:\ to\ the\ (?:ground|floor))?){_ENDS}""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""The same said of what brings it down: "an explosion knocks him off his feet"."""
 _DENIED = re.compile(r"\b(?:almost|nearly|without|not|never|avoids?)\ (?:\w+\ )?$", re.IGNORECASE | re.VERBOSE)
 _HOW = {"slip": "on the back with slipping feet", "trip": "on the face with tripping feet"}
 """The way in which it falls: a verb of its own would be read as another movement."""
@@ -51,7 +77,9 @@ _AS_END = {"": "", "s": "s", "es": "s", "e": "", "ing": "ing", "ping": "ing", "p
 
 
 def with_falls(prompt: str) -> str:
-    """Return a prompt in which a body whose feet slip or trip falls, unless it catches itself or nearly does so."""
+    """Return a prompt in which a body whose feet slip or trip, or that is knocked down, falls, unless it catches itself
+    or nearly does so."""
+    prompt = _DOWNS.sub(_brought_down, _DOWNED.sub(_knocked_down, prompt))
     text = _SLIPS.sub(lambda found: _falls(found, "slip"), prompt)
     text = _LOSES.sub(lambda found: _falls(found, "slip"), text)
     return _TRIPS.sub(lambda found: _falls(found, "trip"), text)
@@ -63,3 +91,18 @@ def _falls(found: re.Match[str], verb: str) -> str:
         return found[0]
     end = _AS_END[(found["end"] or "").lower()]
     return f"fall{end} {_HOW[verb]}"
+
+
+def _knocked_down(found: re.Match[str]) -> str:
+    """Return a fall, the way that it is knocked, in place of a body that is knocked down."""
+    if _DENIED.search(found.string[: found.start()]):
+        return found[0]
+    far = (found["far"] or found["away"] or "").strip()
+    ongoing = found[0].lower().startswith(("getting", "being"))
+    return f"{'falling' if ongoing else 'falls'} {far.lower() or 'to the ground'}"
+
+
+def _brought_down(found: re.Match[str]) -> str:
+    """Return a fall of whom another knocks down."""
+    who = {"him": "he", "her": "she", "them": "a person"}[found["whom"].lower()]
+    return f"{who} falls {found['far'].lower() if found['far'] else 'to the ground'}"

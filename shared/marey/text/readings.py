@@ -49,7 +49,7 @@ from marey.vocabulary.who_acts import says_more
 
 SURELY, SURELY_AGREED = 0.9, 0.4
 """Probabilities from which on there is no doubt about an action, and about the only one that the words name."""
-UNSPLIT = 0.35
+UNSPLIT = 0.2
 """Probability from which on a prompt that is no sequence asks for one action."""
 ATTACK = "stab"
 """Action that "lunges" is read as."""

@@ -5,6 +5,8 @@ from __future__ import annotations
 import itertools
 import re
 
+from marey.vocabulary.word_lists import load_word_lists
+
 _NAME = re.compile(r"(?<![\w/.@])\w*[^\W_]_[^\W_]\w*(?![\w/@])")
 """A word with an underscore inside."""
 _PARTS = re.compile(r"\d+deg|[A-Z]{2,}(?=[A-Z][a-z])|[A-Z]?[a-z']+|[A-Z]+|\d+")
@@ -48,8 +50,11 @@ _STRUCK_PARTS = frozenset(
 _DEATHS = frozenset({"death", "deaths", "die", "dies", "dying", "dead"})
 """First parts of takes of who dies; what such a body did before is no movement behind it: "DEATH_walk_forward"."""
 _WAYS = frozenset("walk walking run running sprint sprinting jog jogging".split())  # noqa: SIM905
+_RESTS = frozenset({"idle", "stand", "sit", "wait", "sneak", "crawl", "dance", "talk"})
 _ORDERED = frozenset({"then", "and", "to"})
 """Parts between those of one fall: "DEATH_knees_then_forward"."""
+_SUCH = frozenset({"old", "young", "elderly", "little", "big", "fat", "tall", "small", "heavy"})
+"""Words before who does it."""
 _STRIKES = "punch(?:es)?|jabs?|hooks?|cross|uppercuts?|elbows?|knees?|kicks?|roundhouse|blocks?|slash(?:es)?|stabs?"
 _LETTERED = re.compile(rf"\b(?P<blow>{_STRIKES})[ ](?P<side>[lr])\b(?!['’])", re.IGNORECASE)
 """A blow with the letter of its side: "punch L"."""
@@ -82,7 +87,16 @@ def _words_of(name: re.Match[str]) -> str:
         said = said[1:]
     if said and said[0] in _DEATHS:
         said = [word for word in said if word not in _ORDERED | _WAYS]  # one fall
-    return " ".join(_of_hit(said)) or name[0].replace("_", " ")
+    return " ".join(_of_hit(_person_first(said))) or name[0].replace("_", " ")
+
+
+def _person_first(said: list[str]) -> list[str]:
+    """Return the words of a take with who does it before what is done: "old man walk" of "walk old man"."""
+    people = load_word_lists().people
+    if len(said) < 2 or said[-1] not in people or said[0] not in _WAYS | _RESTS:
+        return said
+    at = -2 if len(said) > 2 and said[-2] in _SUCH else -1
+    return [*said[at:], *said[:at]]
 
 
 def _of_hit(said: list[str]) -> list[str]:

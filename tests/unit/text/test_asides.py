@@ -16,6 +16,10 @@ from marey.text.asides import without_asides
         ("volleyball: clap twice, serve with the left hand", "clap twice, volleyball serve with the left hand"),
         ("an old man: sits down, coughs", "an old man: sits down, coughs"),
         ("a karate form: block, punch, kick", "a karate form: block, punch, kick"),
+        ("death, shot in the chest, falls backward", "shot in the chest, falls backward"),
+        ("guard patrol, walks ahead, turns around", "walks ahead, turns around"),
+        ("death, clutching the chest", "death, clutching the chest"),
+        ("patrol, then stops", "patrol, then stops"),
         ("the boy waves: arm up, arm down", "the boy waves: arm up, arm down"),
     ],
 )

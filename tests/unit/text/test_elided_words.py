@@ -12,6 +12,17 @@ from marey.text.elided_words import parts_by_sides, with_elided
     [
         ("points left, then right", "points left, then points right"),
         (
+            "a man takes four large steps forward then turns left and takes two more",
+            "a man takes four large steps forward then turns left and takes two more steps",
+        ),
+        (
+            "takes three steps to the left, then two more back",
+            "takes three steps to the left, then takes two more steps back",
+        ),
+        ("throws two punches, ducks and throws another one", "throws two punches, ducks and throws another one punch"),
+        ("lands three kicks, rests, then one more", "lands three kicks, rests, then lands one more kick"),
+        ("waits four seconds, then takes two", "waits four seconds, then takes two"),
+        (
             "points to the left, at the ceiling and at himself",
             "points to the left, then points at the ceiling, then points at himself",
         ),

@@ -12,6 +12,9 @@ from marey.vocabulary.take_names import as_words
     ("name", "words"),
     [
         ("idle_injured", "idle injured"),
+        ("walk_old_man", "old man walk"),
+        ("idle_guard_01", "guard idle"),
+        ("pick_up_baby", "pick up baby"),
         ("DEATH_BACKWARD_01", "death backward"),
         ("DEATH_knees_then_forward", "death knees forward"),
         ("ATK_sword_combo_3hit", "attack sword combo 3 hit"),
