@@ -27,6 +27,7 @@ from marey.drawing.moonwalks import moonwalk
 from marey.drawing.peeks import catch, peek
 from marey.drawing.pitches import pitch
 from marey.drawing.planks import plank
+from marey.drawing.rides import bicycle_ride, horse_ride
 from marey.drawing.sidesteps import sidestep
 from marey.drawing.slips import slip_caught
 from marey.drawing.sports import bowling, fencing_lunge, jump_shot, tennis_serve
@@ -80,6 +81,9 @@ _LOW = re.compile(r"\b(?:tables?|desks?|counters?|workbench|bench|low(?:er)?|tru
 _LIGHT = re.compile(r"\b(?:light|small|little|empty|quickly)\b")
 _POINTS = re.compile(r"\bthree[- ]point\w*")
 _FIGHTS = re.compile(r"\b(?:(?:kick)?box(?:er|ing)s?|fight\w*|spar(?:s|ring)|guard|mma|martial|muay|ring|karate)\b")
+_GALLOPS = re.compile(r"\b(?:gallop\w*|charg\w+|rac(?:es?|ing)|full speed|at speed|fast|hard|flees?|fleeing)\b")
+_TROTS = re.compile(r"\b(?:trot\w*|canter\w*)\b")
+_HURRIES = re.compile(r"\b(?:fast|hard|furiously|quick\w*|rac(?:es?|ing)|sprint\w*|speed\w*)\b")
 _ONE_HAND = re.compile(r"\b(?:one|a|his|her|their) (?:hand|arm|shoulder|elbow|finger)\b")
 _TO_FEET = re.compile(r"\bfrom (?:one )?foot to\b")
 _HEAVY = re.compile(r"\b(?:heavy|heavily|massive|stuck|jammed|hard|huge|iron|shov\w+|strain\w*|struggl\w*)\b")
@@ -265,6 +269,16 @@ def _rowing(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: 
     return rowing(rng, _times(stated), seconds)
 
 
+def _horse_ride(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    said = f"{stated.words} {wish.prompt}".lower()
+    pace = "gallop" if _GALLOPS.search(said) else "trot" if _TROTS.search(said) else "walk"
+    return horse_ride(rng, pace, seconds)
+
+
+def _bicycle_ride(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    return bicycle_ride(rng, fast=bool(_HURRIES.search(f"{stated.words} {wish.prompt}".lower())), seconds=seconds)
+
+
 def _toe_bounce(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
     lasts = seconds or rng.uniform(*(_BRIEF_BOUNCES_S if any(wish.beside) else _BOUNCES_S))
     text = " ".join((wish.prompt, *wish.beside)).lower()
@@ -327,6 +341,8 @@ NAMED: Mapping[str, Callable[[StatedBearing, FineWish, random.Random, float | No
     "curtsy": _curtsy,
     "cower": _cower,
     "rowing": _rowing,
+    "horse-ride": _horse_ride,
+    "bicycle-ride": _bicycle_ride,
     "toe-bounce": _toe_bounce,
     "vacuuming": _vacuuming,
     "door-pulled": _door,
