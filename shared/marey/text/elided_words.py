@@ -87,6 +87,15 @@ _COUNTED_AND_MORE = re.compile(
     re.IGNORECASE | re.VERBOSE,
 )
 """A count of something, and another without its name: "takes four steps, turns left and takes two more"."""
+_STANDS_UP = re.compile(
+    r"""\b(?:kneel(?:s|ing)?|sit(?:s|ting)?|l(?:ies?|ays?|ying)|crouch(?:es|ing)?)\b
+    (?:(?!\b(?:stand|get|rise|up|walk|run)\w*)[^.;])*?
+    (?:,\ (?:and\ )?(?:then\ )?|\ and\ (?:then\ )?|\ then\ )(?:(?:he|she|they)\ )?(?:(?:slowly|quickly)\ )?
+    (?:stands?|standing|ris(?:es?|ing))(?=\W*$|[,;.]|\ (?:and|then|again)\b)
+    (?!(?:,|\ and)\ (?:still|there|straight)\b)""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""A body that sits, kneels or lies, and then "stands"."""
 _PLURAL = re.compile(r"(?<=[cs]h)es$|(?<=[sx])es$|s$")
 _RESTS = re.compile(
     r"(?:stand|stop|halt|rest|wait|pause)s?(?: (?:still|there|up|straight|upright|again))*\W*$", re.IGNORECASE
@@ -115,6 +124,7 @@ def parts_by_sides(prompt: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
 def with_elided(prompt: str) -> str:
     """Return a prompt with the words that it leaves out: "points left, then points right" of "points left, then right",
     "stands still, then walks" of "walk start". Any other prompt is returned as it is."""
+    prompt = _STANDS_UP.sub(r"\g<0> up", prompt)
     prompt = _COUNTED_AND_MORE.sub(_counted_again, _PLACES.sub(_pointed_again, prompt))
     return _OTHER_SIDE.sub(_said_again, _STOPS.sub(_stopping, _STARTS.sub(_starting, prompt)))
 

@@ -34,6 +34,11 @@ _WORD = re.compile(r"[a-z]+(?:['’-][a-z]+)*")
 _JOINTS = re.compile(r"[,;:.]\s|\b(?:and|then|while|as|before|after|until|but)\b", re.IGNORECASE)
 """Words and signs between clauses."""
 _SIGNS = " ,.;:!?()\"'"
+_SKIDS = re.compile(
+    r"(?:skid|slid|slow|com|grind|screech)\w*\s(?:down\s)?(?:to|into)\s(?:an?\s)?(?:\w+\s)?(?:stop|halt|standstill)\b",
+    re.IGNORECASE,
+)
+"""The way in which a run ends: "slides to a stop"."""
 
 
 @dataclass(frozen=True)
@@ -184,7 +189,8 @@ def _is_said(clause: _Clause, row: ReadMovement | None, named: frozenset[str]) -
         return True
     if named & set(_WORD.findall(clause.verb)) and not (_is_as_written(row)):
         return True
-    return is_end(without_joints(text)) or goes_on(text) or bool(STOPS.match(text) or HERE.match(text))
+    stops = STOPS.match(text) or _SKIDS.match(text) or HERE.match(text)
+    return is_end(without_joints(text)) or goes_on(text) or stops is not None
 
 
 def _is_own(clause: _Clause, clauses: Sequence[_Clause]) -> bool:

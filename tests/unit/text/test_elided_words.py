@@ -11,6 +11,10 @@ from marey.text.elided_words import parts_by_sides, with_elided
     ("prompt", "read"),
     [
         ("points left, then right", "points left, then points right"),
+        ("kneels on the right knee and then stands", "kneels on the right knee and then stands up"),
+        ("a monk sits, then slowly rises and bows", "a monk sits, then slowly rises up and bows"),
+        ("sits, gets up and stands", "sits, gets up and stands"),
+        ("sits and stands still", "sits and stands still"),
         (
             "a man takes four large steps forward then turns left and takes two more",
             "a man takes four large steps forward then turns left and takes two more steps",

@@ -45,6 +45,7 @@ def test_clauses_that_no_movement_shows_are_left_out(reading: TextPipeline, prom
         "takes a bullet in the right shoulder, jerks back but stays standing",
         "she kneels to pick up a coin, then stands up",
         "cheer: both fists pumped in the air",
+        "a boy runs and slides to a stop",
     ],
 )
 def test_settings_aims_and_what_others_do_are_not(reading: TextPipeline, prompt: str) -> None:

@@ -104,6 +104,7 @@ def test_verbs_of_seeming_go_with_what_they_say(prompt: str, left: str) -> None:
         ("leans on a shovel", "", ["stick-lean"]),
         ("wipes his mouth with the back of his left hand", "", ["mouth-wiped"]),
         ("swings both arms forward and backward", "", ["arms-swung"]),
+        ("flaps her arms slowly like a swan", "", ["arms-flapped"]),
         ("pulls her left arm across her chest", "", ["arm-across-stretch"]),
         ("throws up into a bucket", "", ["vomit"]),
         ("clutches his chest in pain", "", ["hand-on-heart"]),
