@@ -54,6 +54,8 @@ _EVENT = re.compile(
     re.IGNORECASE | re.DOTALL,
 )
 """An event that names what is told behind it: "death, shot in the chest, falls backward"."""
+_TELLS = re.compile(r"(?:he|she|they|it)\b|[a-z]+(?:s|ing)\b|[a-z]+ (?:in|by|from|with)\b", re.IGNORECASE)
+"""The beginning of what is told: who acts, a verb, or how a body is hit."""
 _WISH = re.compile(
     r"""^(?:(?:ok(?:ay)?|hi|hello|hey|please|so|now)\ )*
     (?:(?:we|i|you)(?:\ (?:need|want|are|have)|'d|'re|'ll|\ would|\ could|\ will)\b
@@ -134,7 +136,11 @@ def _without_aim(found: re.Match[str]) -> str:
 def _without_title(text: str) -> str:
     """Return a text without the words before a colon that only name what comes: "Comedy bit:", "I need a loop:"."""
     event = _EVENT.match(text)
-    if event is not None and named_actions(event["event"]) & named_actions(event["said"]):
+    if (
+        event is not None
+        and _TELLS.match(event["said"])
+        and named_actions(event["event"]) & named_actions(event["said"])
+    ):
         return event["said"]
     found = _TITLE.match(text)
     if found is None:

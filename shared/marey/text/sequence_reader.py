@@ -39,6 +39,7 @@ from marey.text.reader_file import Float32, Reader
 from marey.vocabulary.bearing_words import BarePrompt
 from marey.vocabulary.bearings import DRAWN_AS
 from marey.vocabulary.counts import STEPPING, stated_count
+from marey.vocabulary.distances import stated_distance
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.gazes import only_gaze, without_gaze
 from marey.vocabulary.inflection import phrase_in_third_person
@@ -46,7 +47,7 @@ from marey.vocabulary.peeks import only_peeks
 from marey.vocabulary.scope import STANDING, every_action, match_scope
 
 FILE = Path(__file__).with_name("sequence_reader.safetensors")
-VERSION = 13
+VERSION = 14
 """Raise it when the same prompt and file give other movements."""
 STATE_SCALE, VECTOR_SCALE = 6.0, 10.0
 """Factors of token states and of sentence vectors."""
@@ -202,7 +203,8 @@ class SequenceReader(Reader):
         clauses = [clause for group in groups for clause in group]
         if len(groups) < 2 or not _is_clear(clauses):
             return ()
-        if _is_one_action([clause.name for clause in clauses], action) and not _stops_on_a_way(clauses):
+        together = _is_one_action([clause.name for clause in clauses], action)
+        if together and not (_stops_on_a_way(clauses) or _measures_ways(clauses)):
             return _turn_and_rest(clauses)
         if any("negation" in match_scope(_WITHOUT.sub("", each.text), every_action()).flags for each in clauses):
             return ()
@@ -365,6 +367,12 @@ def _stops_on_a_way(clauses: Sequence[ReadClause]) -> bool:
         way.name in WAYS and after.name == STANDING and STOPS.match(without_joints(after.text)) is not None
         for way, after in itertools.pairwise(clauses)
     )
+
+
+def _measures_ways(clauses: Sequence[ReadClause]) -> bool:
+    """Return True if the lengths of two ways are said: "takes three steps, turns and takes two more steps"."""
+    ways = [clause for clause in clauses if clause.name in WAYS]
+    return len(ways) > 1 and any(stated_distance(clause.text, clause.name) is not None for clause in ways)
 
 
 def from_there(movements: Iterable[ReadMovement]) -> tuple[ReadMovement, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 
 from marey.vocabulary.inflection import in_form_of
+from marey.vocabulary.lengths import TO_TWENTY
 
 _TAKES_A_LEFT = re.compile(
     r"""\b(?:take|make|hang|do)(?P<s>s)?\ (?P<how>an?\ (?:[\w-]+\ )?)(?P<side>left|right)
@@ -38,12 +39,20 @@ _RUNS_AND_TURNS = re.compile(
     re.IGNORECASE | re.VERBOSE,
 )
 """A run with a turn to a side, of which models read a run ahead."""
+_STEPS_ON = re.compile(
+    rf"""\b(?P<turn>turn(?:s|ing)?(?:\ (?!and\b|then\b)[\w-]+){{1,6}}?),?\ and
+    \ (?=(?:takes?|taking|walks?|walking)\ (?:another\ )?(?:{"|".join(TO_TWENTY.split())}|\d+|a\ few|several)
+    (?:\ [\w-]+){{0,2}}?\ (?:steps?|strides?|paces?|met(?:er|re)s)\b)""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""A turn with counted steps behind it, which together would be read as one turn."""
 
 
 def with_turns_told(prompt: str) -> str:
     """Return a prompt in which such turns are told as the vocabulary does."""
     text = _TAKES_A_LEFT.sub(r"take\g<s> \g<how>\g<side> turn", prompt)
     text = _WHIRLS.sub(_turns, _WHEELS.sub(_turns, text))
+    text = _STEPS_ON.sub(r"\g<turn>, then ", text)
     text = _FACES.sub(lambda found: f"turn{_s(found)} {found['side']} 90 degrees in place", text)
     text = _ABOUT_FACES.sub(_faces_about, text)
     return _RUNS_AND_TURNS.sub(_takes_a_turn, text)

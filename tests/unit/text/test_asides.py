@@ -19,6 +19,7 @@ from marey.text.asides import without_asides
         ("death, shot in the chest, falls backward", "shot in the chest, falls backward"),
         ("guard patrol, walks ahead, turns around", "walks ahead, turns around"),
         ("death, clutching the chest", "death, clutching the chest"),
+        ("death, arrow, drops to the floor", "death, arrow, drops to the floor"),
         ("patrol, then stops", "patrol, then stops"),
         ("the boy waves: arm up, arm down", "the boy waves: arm up, arm down"),
     ],

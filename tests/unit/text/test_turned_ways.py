@@ -22,6 +22,8 @@ from marey.text.turned_ways import with_turns_told
         ("run and bear right", "run and take a right turn"),
         ("the sentry about-faces and marches off", "the sentry turns around and marches off"),
         ("turns about-face, then salutes", "turns around, then salutes"),
+        ("turns left and takes two more steps", "turns left, then takes two more steps"),
+        ("turns to the right, and walks 3 meters", "turns to the right, then walks 3 meters"),
     ],
 )
 def test_turns_are_told_as_such(prompt: str, told: str) -> None:
