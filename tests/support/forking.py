@@ -30,6 +30,7 @@ IMPORTED = (
     *("torch", "numpy", "scipy", "safetensors.torch", "tokenizers", "httpx2", "sqlalchemy", "alembic", "fastapi"),
     *("marey.cli.main", "marey.client.transport", "marey.client.fetching", "marey.core.settings", "rich.progress"),
     *("marey.generate.oneshot", "marey.text.pipeline", "marey.text.light", "marey.text.minilm_encoder", "marey.db"),
+    *("marey.generation.candidates", "marey.vocabulary.scope"),
 )
 REPOSITORY = Path(__file__).resolve().parents[2]
 LENGTH = 8
@@ -201,6 +202,8 @@ if __name__ == "__main__":
         importlib.import_module(module)
     typer.main.get_command = functools.cache(typer.main.get_command)  # which `app()` calls: a tenth of a second
     typer.main.get_command(importlib.import_module("marey.cli.main").app)
+    scope = importlib.import_module("marey.vocabulary.scope")
+    scope.match_scope("a person walks", scope.every_action())  # its patterns: more than half a second
     gc.freeze()
     with socket.socket(fileno=int(sys.argv[1])) as link:
         forked = _command(link)

@@ -20,7 +20,8 @@ from marey.jobs import WorkerHeartbeat
 from marey.runtime.live.loop import LiveLoop
 from marey.runtime.live.port import Parse, SessionPool
 from marey.runtime.live.supervisor import StreamSupervisor
-from marey.streams import NewStream, StreamRow, create_stream, get_stream
+from marey.streams import NewStream, StreamRow, create_stream, get_stream, stream_actions, stream_prompts
+from marey.streams.actions import ActionStart
 from marey.streams.control import ControlQueue, StreamControl
 from marey.streams.frames import Frame, decode_frame
 from marey.streams.presence import ViewerPresence
@@ -80,6 +81,10 @@ class LiveWorker:
         self.stop()
 
 
+Start = Callable[..., LiveWorker]
+"""Starts a worker."""
+
+
 class Studio:
     """A client's view of streams."""
 
@@ -125,3 +130,28 @@ class Studio:
         while not condition():
             assert time.monotonic() < deadline, f"{what} did not come in {PATIENCE:g} s"
             time.sleep(0.05)
+
+
+def whole(studio: Studio, stream: UUID) -> list[Frame]:
+    """The frames of a stream, none missing."""
+    frames = [frame for frame in studio.frames(stream) if isinstance(frame, Frame)]
+    assert [frame.number for frame in frames] == list(range(len(frames)))
+    return frames
+
+
+def farthest_step(frames: list[Frame]) -> float:
+    """Return the farthest way of the root between two frames, in metres."""
+    roots = np.stack([frame.root for frame in frames])
+    return float(np.linalg.norm(np.diff(roots, axis=0), axis=1).max())
+
+
+def actions_of(studio: Studio, stream: UUID) -> list[ActionStart]:
+    """The acts of a stream that have begun."""
+    with transaction(studio.engine) as conn:
+        return stream_actions(conn, stream)
+
+
+def prompts_of(studio: Studio, stream: UUID) -> list[tuple[int, str]]:
+    """The first frame and the words of each prompt of a stream."""
+    with transaction(studio.engine) as conn:
+        return stream_prompts(conn, stream)

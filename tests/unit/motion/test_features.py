@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from marey.motion.features import (
     layout,
     mirror_joints,
 )
-from marey.motion.filters import smooth
+from marey.motion.filters import smooth, smooth_above
 from marey.motion.kinematics import facing, forward_kinematics
 from marey.motion.rotations import about, angle_between, from_6d, from_rotvec, multiply, rotate
 from marey.motion.skeleton import HUMANML3D, Skeleton
@@ -260,6 +261,19 @@ def test_smoothing_keeps_constants_and_narrows_noise():
     assert smooth(np.full((30, 2), 3.0), 5) == pytest.approx(3.0)
     noise = np.random.default_rng(0).normal(size=(500, 1))
     assert smooth(noise, 4).std() == pytest.approx((2 * 4 * np.pi**0.5) ** -0.5, rel=0.2)
+
+
+@pytest.mark.parametrize("frames", [1, 4, 40])
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_a_smoothed_frame_is_the_mean_of_those_around_it_with_the_ends_repeated(
+    frames: int, order: Literal["C", "F"]
+) -> None:
+    values = np.asarray(np.random.default_rng(1).normal(size=(frames, 3)), order=order)
+    weights = np.exp(-0.5 * (np.arange(-6, 7) / 2.0) ** 2)
+    around = np.clip(np.arange(frames)[:, None] + np.arange(-6, 7), 0, frames - 1)
+    wanted = (values[around] * (weights / weights.sum())[:, None]).sum(axis=1)
+    np.testing.assert_allclose(smooth(values, 2.0), wanted, atol=1e-12)
+    np.testing.assert_allclose(smooth_above(values[:, 0], 2.0), smooth(values[around, :1].max(axis=1), 2.0)[:, 0])
 
 
 @pytest.mark.parametrize(("step", "stands"), [(0.04, True), (0.055, False)])
