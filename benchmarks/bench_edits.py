@@ -1,8 +1,8 @@
 """Edits by a model: adherence of new frames, jerk around their seams, and time beside that of a generation.
 
-Development prompts of single actions that the bundle supports are painted into motions of 9 s and appended to them, and
-judged by the referee beside motions of the prompt alone. Jerk is that of all joints within half a second of a seam,
-beside the same in the middle of real clips with `MAREY_PREPARED=folder`.
+Development prompts of single actions that the bundle supports are painted into motions of 9 s, appended to them, and
+put between two of them, and judged by the referee beside motions of the prompt alone. Jerk is that of all joints within
+half a second of a seam, beside the same in the middle of real clips with `MAREY_PREPARED=folder`.
 
     OMP_NUM_THREADS=1 MAREY_PREPARED=prepared python -m benchmarks edits
 """
@@ -55,6 +55,7 @@ def main() -> None:
     row("alone", *judge(prompts, partial(alone, model)))
     row("repaint of 4 s", *judge(prompts, partial(repainted, model, hosts)))
     row("extension by 4 s", *judge(prompts, partial(extended, model, hosts)))
+    row("4 s between two motions", *judge(prompts, partial(between, model, hosts)))
     if folder := os.environ.get("MAREY_PREPARED"):
         row("real clips, in their middle", [], [*real(Path(folder))])
     print()
@@ -103,6 +104,19 @@ def extended(
     (clip,) = model.edit(host, [cut, op])
     first = round(START * clip.fps) + 1
     return clip, first, clip.frames, [first]
+
+
+def between(
+    model: LocalModel, hosts: Sequence[MotionClip], prompt: ActionPrompt, seed: int
+) -> tuple[MotionClip, int, int, Sequence[int]]:
+    """Lead a motion to another one by a prompt."""
+    before, after = hosts[seed % len(hosts)], hosts[(seed + 1) % len(hosts)]
+    cut = {"op": "trim", "to": START}
+    way = {"op": "in-between", "with": after, "seconds": END - START, "prompt": prompt.text, "seed": seed}
+    (clip,) = model.edit(before, [cut, {**way, "force": True}])
+    first = round(START * clip.fps) + 1
+    end = first + round((END - START) * clip.fps)
+    return clip, first, end, [first, end]
 
 
 def real(folder: Path) -> Iterator[Window]:

@@ -157,17 +157,18 @@ def report(name: str, shown: Sequence[bool], jerks: Sequence[tuple[float, float]
 
 
 def time_lengths(generator: Any, texts: Sequence[TextFeatures]) -> None:
-    """Print the seconds of timelines of 20 s and 60 s, of rows of 4 s, and the memory that they take."""
+    """Print the seconds of timelines of 20 s and 60 s, of rows of 4 s, and the memory that they take with finishing."""
 
-    def run(rows: int, count: int = 1) -> None:
+    def run(rows: int, count: int = 1) -> list[Any]:
         times = [TimelineRow(4.0 * row, 4.0 * row + 4, "-") for row in range(rows)]
         own = [texts[row % ROWS] for row in range(rows)]
-        generate_timelines(generator, [timeline_request(times, own, seed, None) for seed in range(count)])
+        return generate_timelines(generator, [timeline_request(times, own, seed, None) for seed in range(count)])
 
     timings = measure({"20 s": lambda: run(5), "60 s": lambda: run(15)}, repeats=7, seconds=90)
     print(table("one timeline", timings, baseline="20 s"))
     for count, rows in ((1, 5), (1, 15), (BATCH, 5), (BATCH, 15)):
         forget_peak(os.getpid())
         before = peak_megabytes(os.getpid())
-        run(rows, count)
+        for motion in run(rows, count):
+            joints_of(generator, motion)
         print(f"{count} of {4 * rows} s: {peak_megabytes(os.getpid()) - before:.0f} MB more at the peak", flush=True)

@@ -70,6 +70,14 @@ FINISH = sa.text("""
 """)
 
 
+# The worker finds the frames of a cycle, so the submit does not know which rows of a timeline they show.
+TELL_CYCLES = sa.text("""
+    UPDATE item SET prompt = new.prompt
+    FROM json_to_recordset(CAST(:prompts AS json)) AS new(item_id uuid, prompt text)
+    WHERE item.id = new.item_id AND item.edits @> '{"ops": [{"op": "loop"}]}' AND item.prompt <> new.prompt
+""")
+
+
 def begin_assets(conn: sa.Connection, lease_token: UUID, assets: Sequence[AssetDigest]) -> bool:
     """Announce assets before their upload (rows `writing`), in a transaction of its own.
 
@@ -201,8 +209,19 @@ def _finish(conn: sa.Connection, job: LockedJob, motions: Sequence[NewMotion]) -
         for motion in motions
         for name, file in motion.files.items()
     ]
+    _tell_cycles(conn, motions)
     digests = {file["sha256"] for file in files}
     _store(conn, job, digests, items=[motion.item for motion in motions], motions=rows, files=files)
+
+
+def _tell_cycles(conn: sa.Connection, motions: Sequence[NewMotion]) -> None:
+    """Set the prompts of items whose operations cut a cycle to those of the frames that they hold, as their manifests
+    have them; before the motions are written, which are searched by the prompts of their items."""
+    edited = [motion for motion in motions if "edited_from" in motion.metadata]
+    prompts = [{"item_id": str(each.item), "prompt": each.metadata.get("prompt")} for each in edited]
+    told = [each for each in prompts if each["prompt"]]
+    if told:
+        conn.execute(TELL_CYCLES, {"prompts": json.dumps(told)})
 
 
 def _store(

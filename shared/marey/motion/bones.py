@@ -28,6 +28,9 @@ LONGEST = 0.1
 TOE, END, BODY = 0.02, 0.5, 0.2
 """Mobilities of toes, which stand, of hands and head, and of the joints of rigid bodies: pelvis and chest keep the way
 that they face. That of other joints is 1, and that of the toes of a leg far from its length, which is in a swing."""
+AT_ONCE = 256
+"""Frames that are solved together, more than the longest motion of a bundle: each takes 26 kB, so that the memory does
+not grow with the length of a timeline."""
 NEAR, FAR = 0.02, 0.1
 """Metres by which the bones of a leg are off, all together, up to which its toe stays, and from which it moves."""
 
@@ -65,7 +68,12 @@ class BoneFit:
 
     def fit(self, joints: Array) -> Array:
         """Return joints (T, J, 3) near to the given ones (T, J, 3), in metres, with bones of the skeleton's lengths."""
-        joints = np.array(joints, np.float64)
+        parts = (joints[first : first + AT_ONCE] for first in range(0, len(joints), AT_ONCE))
+        fitted = [self._fit(np.array(part, np.float64)) for part in parts]
+        return np.concatenate(fitted) if fitted else np.array(joints, np.float64)
+
+    def _fit(self, joints: Array) -> Array:
+        """Return the joints of some frames, changed in place."""
         off = np.abs(_lengths(self._bones(joints)) - self._lengths)
         far_off = [np.clip((off[:, leg].sum(axis=1) - NEAR) / (FAR - NEAR), 0.0, 1.0) for _, leg, _ in self._toes]
         free = [(1.0 - TOE) * smoothstep(share) for share in far_off]

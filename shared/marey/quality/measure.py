@@ -29,6 +29,8 @@ POP_FPS = 20.0
 POP_STEP = 0.16
 """Metres that a joint moves in one frame beyond `POP_RATIO` times its faster neighbouring step."""
 POP_RATIO = 3.0
+AT_ONCE = 256
+"""Frames whose capsules are measured together, so that the memory does not grow with the length of a motion."""
 SHORTEST = 4
 """Frames of the shortest clip that is measured."""
 
@@ -178,5 +180,6 @@ def _angles(a: Array, b: Array) -> Array:
 
 def self_contact(joints: Array) -> float:
     """Return the deepest that two capsules of the body pass into each other, metres, 0 or more."""
-    distance = segment_distance(*(joints[:, ends] for ends in (*_FIRST, *_SECOND)))
-    return float(max(0.0, (_REACH - distance).max()))
+    parts = (joints[first : first + AT_ONCE] for first in range(0, len(joints), AT_ONCE))
+    distances = (segment_distance(*(part[:, ends] for ends in (*_FIRST, *_SECOND))) for part in parts)
+    return float(max((_REACH - distance).max() for distance in distances).clip(0.0))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from uuid import UUID, uuid4
 
 import httpx2
@@ -356,3 +357,23 @@ def test_a_check_of_an_edit_knows_the_quota(api: LiveApi) -> None:
         assert (quota["name"], quota["asked"], quota["left"]) == ("queued", 2, 3)
         refused = theirs.post(path, json={"ops": [split, split]})
         assert (refused.status_code, refused.json()["type"]) == (429, "urn:marey:problem:quota")
+
+
+def test_the_loop_of_a_timeline_is_found_by_the_prompt_of_its_frames(api: LiveApi, http: httpx2.Client) -> None:
+    rows = [(0.0, 1.0, "a person bows"), (1.0, 6.05, "a person walks")]
+    told = [{"start": start, "end": end, "prompt": prompt} for start, end, prompt in rows]
+    text = "; ".join(f"{start:g}-{end:g} {prompt}" for start, end, prompt in rows)
+    record = {"rows": told, "transitions": [], "gaps": []}
+    about = {"prompts": [[0, rows[0][2]], [20, rows[1][2]]], "timeline": record}
+    clip = walker(seconds=6.0, prompt=text)
+    source = stored(api, text, clip=replace(clip, manifest={**clip.manifest, **about}))
+    (loop,) = edited(api, source["id"], {"op": "loop"})
+    metadata = http.get(f"/v1/motions/{loop['id']}").json()["metadata"]
+    assert metadata["loop"]["source_frames"][0] > 20
+    assert loop["prompt"] == metadata["prompt"] == "a person walks"
+    (item,) = http.get(f"/v1/jobs/{loop['job']}/items").json()["items"]
+    assert item["prompt"] == "a person walks"
+    found = http.get("/v1/motions", params={"text": "walks"}).json()["items"]
+    assert loop["id"] in [each["id"] for each in found]
+    bows = http.get("/v1/motions", params={"text": "bows"}).json()["items"]
+    assert [each["id"] for each in bows] == [source["id"]]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,13 +11,17 @@ import pytest
 from marey.bundles.manifest import BundleManifest
 from marey.generation.export import finish
 from marey.generation.port import Request
-from marey.generation.shots.asked_frames import JOIN, asks_more, frames_alone, joined
+from marey.generation.shots.asked_frames import JOIN, asks_more, frames_alone, frames_between, joined, ways
+from marey.generation.shots.edit_levels import LevelledFrames
 from marey.generation.shots.editor import EditModel
 from marey.generation.shots.windows import CROSSFADE
 from marey.models.hgm3.generate import Generator
 from marey.motion import MotionClip, edit
 from marey.motion.clip import Float32
+from marey.motion.features import encode_all
+from marey.motion.finish import finish_motion
 from marey.text.features import TextFeatures
+from tests.support.bodies import Body
 from tests.support.prepared import text_features
 
 WAVE = "a person waves the left hand"
@@ -42,6 +47,13 @@ def clip(generator: Generator) -> MotionClip:
     return finish(generator, request, made, options)
 
 
+@pytest.fixture(scope="module")
+def standing(generator: Generator) -> MotionClip:
+    """A body that stands still, on the skeleton of the clip."""
+    joints = Body(8.0).joints()
+    return finish_motion(encode_all(generator.layout, joints), generator.layout)
+
+
 def made_by(generator: Generator, clip: MotionClip, **op: object) -> MotionClip:
     forced = {} if op["op"] == "body-part" else {"force": True}
     (result,) = edit(clip, [{**forced, "seed": 3, **op}], model=EditModel.of(generator, {}, text))
@@ -58,6 +70,8 @@ def between_joints(joints: np.ndarray) -> np.ndarray:
     [
         (WAVE, True),
         ("a person walks", False),
+        ("a person runs", True),
+        ("a person climbs stairs", True),
         ("a person stands", False),
         ("a person walks forward three steps", True),
         ("a person walks slowly", True),
@@ -121,7 +135,7 @@ def rows(generator: Generator) -> tuple[Float32, Float32, Float32]:
 
 def test_only_frames_at_the_ends_are_generated_again(drawing: Generator) -> None:
     before, new, after = rows(drawing)
-    whole = joined(drawing, before, new, after, 3, drawing.settings({}))
+    whole = joined(drawing, before, LevelledFrames(new), after, 3, drawing.settings({}), ends=(JOIN, JOIN))
     changed = (whole != np.concatenate([before, new, after])).any(axis=1)
     near = np.zeros(180, bool)
     near[60 - CROSSFADE : 60 + JOIN + CROSSFADE] = near[120 - JOIN - CROSSFADE : 120 + CROSSFADE] = True
@@ -130,10 +144,92 @@ def test_only_frames_at_the_ends_are_generated_again(drawing: Generator) -> None
     assert not changed[~near].any()
 
 
-def test_a_body_that_gets_up_has_more_frames_for_it(drawing: Generator) -> None:
-    before, new, _ = rows(drawing)
-    low = new.copy()
-    low[:, drawing.layout.slices["height"]] -= 0.6
-    whole = joined(drawing, before, low, new[:0], 3, drawing.settings({}))
-    changed = (whole != np.concatenate([before, low])).any(axis=1)
-    assert changed[60:72].all()
+def at_height(drawing: Generator, features: np.ndarray, metres: float) -> np.ndarray:
+    """Features of one pose at a height of the pelvis."""
+    moved = features.copy()
+    moved[:, drawing.layout.slices["height"]] = metres
+    return moved
+
+
+@pytest.mark.parametrize(
+    ("before", "new", "after", "expected"),
+    [
+        (0.9, 0.9, 0.9, (JOIN, JOIN)),
+        (0.9, 0.3, 0.9, (12, 20)),  # a body gets up at 0.6 m/s, and goes down at 1 m/s
+        (0.3, 0.9, 0.3, (20, 12)),
+        (0.9, 0.3, None, (12, 0)),
+        (None, 0.3, 0.9, (0, 20)),
+    ],
+)
+def test_a_body_that_gets_up_has_more_frames_for_it(
+    drawing: Generator, before: float | None, new: float, after: float | None, expected: tuple[int, int]
+) -> None:
+    pose = np.repeat(rows(drawing)[1][:1], 80, axis=0)
+    beside = [pose[:0] if each is None else at_height(drawing, pose, each) for each in (before, after)]
+    level = LevelledFrames(at_height(drawing, pose, new))
+    assert ways(beside[0], level, beside[1], drawing.layout, 4) == expected
+
+
+def test_a_movement_is_not_cut_by_the_way_to_it(drawing: Generator, monkeypatch: pytest.MonkeyPatch) -> None:
+    before, _, after = rows(drawing)
+    options, prompt = drawing.settings({}), text("a person dies")
+    beside = [at_height(drawing, np.repeat(each[:1], 60, axis=0), 0.9) for each in (before, after)]
+    made = frames_between(drawing, beside[0], 80, beside[1], prompt, 3, options)
+    assert len(made.features) == 200
+    rest = ways(beside[0], LevelledFrames(alone(drawing, prompt, 80)), beside[1], drawing.layout, 4)[1]
+    assert rest > JOIN
+    shorter = alone(drawing, prompt, 80 - (rest - JOIN))
+    kept = slice(60 + JOIN + CROSSFADE, 60 + 80 - rest - CROSSFADE)
+    np.testing.assert_allclose(made.features[kept], shorter[kept.start - 60 : kept.stop - 60], atol=1e-6)
+
+
+def alone(drawing: Generator, prompt: TextFeatures, frames: int) -> np.ndarray:
+    return frames_alone(drawing, prompt, 3, frames, drawing.settings({})).features
+
+
+UP, DOWN = "a person climbs up the stairs", "a person walks down the stairs"
+
+
+@pytest.mark.parametrize(("prompt", "low", "high"), [(UP, 0, -1), (DOWN, -1, 0)])
+def test_a_motion_goes_on_where_a_climb_ends(
+    drawing: Generator, standing: MotionClip, prompt: str, low: int, high: int
+) -> None:
+    op = {"op": "repaint", "from": "f40", "to": "f119"}
+    result = made_by(drawing, standing, prompt=prompt, **op)
+    rise = result.joints[:, 0, 1] - standing.joints[:, 0, 1]
+    assert abs(rise[low]) < 0.01
+    assert rise[high] > 0.25
+    for kept in (slice(0, 40), slice(120, None)):
+        np.testing.assert_allclose(
+            between_joints(result.joints[kept]), between_joints(standing.joints[kept]), atol=1e-5
+        )
+        assert np.ptp(rise[kept]) < 1e-5
+    stays = made_by(drawing, standing, prompt=prompt, rest="stay", **op)
+    np.testing.assert_allclose(stays.joints[120:], standing.joints[120:], atol=1e-5)
+
+
+def recorded(result: MotionClip) -> dict[str, Any]:
+    (op,) = result.manifest["edited_from"]["ops"]
+    return op["model"]
+
+
+def test_the_manifest_says_what_was_drawn_and_with_which_bearing(drawing: Generator, clip: MotionClip) -> None:
+    op = {"op": "repaint", "from": 1, "to": 4}
+    assert recorded(made_by(drawing, clip, **op, prompt="a person kneels"))["drawn"] == "kneel"
+    manifest = recorded(made_by(drawing, clip, **op, prompt="a person walks like a zombie"))
+    assert "zombie" in [each["name"] for each in manifest["bearing"]]
+    part = {"op": "body-part", "part": "left-arm"}
+    assert recorded(made_by(drawing, clip, **part, prompt="a person bows"))["drawn"] == "bow"
+    between = {"op": "in-between", "with": clip, "seconds": 2}
+    assert recorded(made_by(drawing, clip, **between, prompt="a person bows"))["drawn"] == "bow"
+    plain = recorded(made_by(drawing, clip, **op))
+    assert not {"drawn", "bearing"} & plain.keys()
+
+
+def test_the_manifest_is_that_of_the_chosen_candidate(drawing: Generator, clip: MotionClip) -> None:
+    prompt = "a person walks forward two metres"
+    op = {"op": "extend", "seconds": 4, "prompt": prompt}
+    chosen = made_by(drawing, clip, **op, candidates=3)
+    singles = [made_by(drawing, clip, **op, seed=3 + number) for number in range(3)]
+    same = [each for each in singles if np.array_equal(each.joints, chosen.joints)]
+    assert [recorded(each).get("distance") for each in same] == [recorded(chosen).get("distance")]

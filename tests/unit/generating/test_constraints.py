@@ -13,7 +13,7 @@ import pytest
 from marey.core.errors import InvalidInput
 from marey.generate.poses import with_poses
 from marey.generation.candidates import DrawPlan
-from marey.generation.constraints import choose, draw
+from marey.generation.constraints import choose, draw, fit
 from marey.generation.constraints.constraint_set import asked_of
 from marey.generation.constraints.draw import constrained_clips, constrained_request
 from marey.generation.constraints.playing import played
@@ -26,7 +26,7 @@ from marey.motion.clip import MotionClip
 from marey.motion.courses import stand_clock
 from marey.motion.curves import fades, smooth_open, through
 from marey.motion.edits.licences import terms_with
-from marey.motion.feet import clean_feet, skate
+from marey.motion.feet import clean_feet, find_contacts, skate
 from marey.motion.kinematics import forward_kinematics
 from marey.motion.pose import solve_pose
 from marey.motion.resample import interpolate, interpolate_rotations
@@ -307,6 +307,25 @@ def test_feet_stand_as_still_at_other_moments() -> None:
     speeds = [skate(joints, stands, HUMANML3D, 20.0) for joints in (motion.joints(HUMANML3D), by_itself)]
     assert speeds[0] < 0.002
     assert speeds[0] < 0.6 * speeds[1]
+
+
+def test_feet_stand_on_a_faster_curve_as_they_do_straight_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    clip = steady_walk()
+    frames, turn = round(0.8 * clip.frames), 1.5
+    radius = float(np.linalg.norm(clip.root[-1, [0, 2]] - clip.root[0, [0, 2]])) / turn
+    angle = np.linspace(0.0, turn, frames)
+    places = radius * np.stack([1 - np.cos(angle), np.sin(angle)], axis=1)
+    at = [*range(0, frames - 1, 5), frames - 1]
+    path = {"type": "root_path", "frames": at, "positions_xz": places[at].tolist()}
+    asked = asked_of(read_constraints([path]), HUMANML3D, frames, 20.0)
+
+    def speed() -> float:
+        joints = fit.fit_clip(clip, asked).joints.astype(np.float64)
+        return 100 * skate(joints, find_contacts(joints, HUMANML3D, 20.0), HUMANML3D, 20.0)
+
+    assert speed() < 0.01  # cm/s
+    monkeypatch.setattr(fit, "with_locked_feet", lambda motion, *_: motion)
+    assert speed() > 0.1
 
 
 def test_a_candidate_whose_toes_stand_stiller_is_better(generator: Any, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from marey.motion.body import STATURE, NamedBody, standard_body, stature, travel_scale
-from marey.motion.bones import BoneFit
+from marey.motion.bones import AT_ONCE, BoneFit
 from marey.motion.features import HUMANML3D_263
 from marey.motion.feet import skate
 from marey.motion.finish import finish_motion
@@ -145,3 +146,24 @@ def test_travel_grows_with_the_body():
     )
     way = [np.linalg.norm(clip.root[-1] - clip.root[0]) for clip in (one, two)]
     assert way[1] / way[0] == pytest.approx(1.75 / 1.73, abs=1e-4)
+
+
+def test_bones_of_a_long_motion_are_those_of_its_parts() -> None:
+    joints, fit = decoded(4, 2 * AT_ONCE + 30), BoneFit(HUMANML3D)
+    whole = fit.fit(joints)
+    assert np.array_equal(whole, np.concatenate([fit.fit(part) for part in np.array_split(joints, 5)]))
+    assert fit.fit(joints[:0]).shape == (0, 22, 3)
+
+
+def test_bones_of_a_minute_take_hardly_more_memory_than_those_of_ten_seconds() -> None:
+    joints, fit = decoded(4, 1200), BoneFit(HUMANML3D)
+
+    def peak(frames: int) -> int:
+        tracemalloc.start()
+        fit.fit(joints[:frames])
+        _, most = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        return most
+
+    peak(200)
+    assert peak(1200) - peak(200) < 5 * joints.nbytes

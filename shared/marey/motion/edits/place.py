@@ -43,6 +43,11 @@ def moved(clip: MotionClip, turn: Array, shift: Array) -> MotionClip:
     return posed(clip, rotations, root)
 
 
+def raised(clip: MotionClip, metres: float) -> MotionClip:
+    """Return the clip at another height; the same one where that is 0."""
+    return moved(clip, about("Y", 0.0), np.array([0.0, metres, 0.0])) if metres else clip
+
+
 def posed(clip: MotionClip, rotations: Array, root: Array, **changes: Any) -> MotionClip:
     """Return the clip with other poses, without features; its joints follow.
 

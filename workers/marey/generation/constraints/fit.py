@@ -7,7 +7,7 @@ import numpy as np
 from marey.generation.constraints.constraint_set import ConstraintSet
 from marey.generation.constraints.effectors import with_targets
 from marey.generation.constraints.paths import asked_places, course_asked, directions
-from marey.generation.constraints.playing import played
+from marey.generation.constraints.playing import played, with_locked_feet
 from marey.generation.constraints.poses import BodyMotion, with_poses
 from marey.generation.constraints.timing import NO_JUMPS, Timing, find_jumps, play_times
 from marey.motion.clip import MotionClip
@@ -33,6 +33,7 @@ def fit_clip(clip: MotionClip, asked: ConstraintSet) -> MotionClip:
     wanted = _course(motion, natural, asked, skeleton)
     if wanted is not None:
         motion = BodyMotion(*bent(motion.rotations, motion.root, motion.contacts, natural, wanted, skeleton, fps))
+        motion = with_locked_feet(motion, skeleton, fps)  # what is left of slides after stands were carried as a whole
     motion = with_poses(motion, asked.keyframes, skeleton, fps)
     motion = with_targets(motion, asked.targets, skeleton, fps)
     return clip_of(clip, motion.rotations, motion.root, contacts=motion.contacts)

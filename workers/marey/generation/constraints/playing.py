@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from marey.generation.constraints.poses import BodyMotion
 from marey.generation.constraints.timing import Timing
@@ -43,9 +44,19 @@ def played(clip: MotionClip, timing: Timing) -> BodyMotion:
         own = _to(turns[piece.start], moved[piece.start], next_turns[0], next_root[0], skeleton)
         turns[piece], moved[piece] = _moved(turns[piece], moved[piece], *own)
         _blend(turns, moved, next_turns[0], next_root[0], piece.start, span)
-    joints = forward_kinematics(skeleton, turns, moved)
-    joints, contacts = clean_feet(joints, skeleton, clip.fps, contacts=contacts)
-    return BodyMotion(aim_bones(joints, turns, skeleton), joints[:, 0], contacts)
+    return with_locked_feet(BodyMotion(turns, moved, contacts), skeleton, clip.fps, contacts=contacts)
+
+
+def with_locked_feet(
+    motion: BodyMotion, skeleton: Skeleton, fps: float, *, contacts: NDArray[np.bool_] | None = None
+) -> BodyMotion:
+    """Return a motion whose standing feet stay in their places.
+
+    Args:
+        contacts: (T, 4) in which feet stand; None = where they are found to.
+    """
+    joints, stands = clean_feet(motion.joints(skeleton), skeleton, fps, contacts=contacts)
+    return BodyMotion(aim_bones(joints, motion.rotations, skeleton), joints[:, 0], stands)
 
 
 def _on_its_feet(clip: MotionClip, times: Array, motion: BodyMotion) -> BodyMotion:

@@ -12,12 +12,19 @@ import numpy as np
 from marey.core.errors import InvalidInput
 from marey.generation.gazing import with_gaze
 from marey.generation.port import GenerationControl, Generator, KeepingGenerator
-from marey.generation.shots.asked_frames import CANCELLED, SHORTEST_S, asks_more, frames_alone, joined
+from marey.generation.shots.asked_frames import (
+    CANCELLED,
+    SHORTEST_S,
+    AskedFrames,
+    asks_more,
+    frames_alone,
+    frames_between,
+)
 from marey.generation.shots.context import Float32, check_error, context_error, frames_at, model_features
 from marey.generation.shots.windows import CONTEXT, FrameGap, Window, crossfaded, fill, most_frames, no_text
 from marey.generation.software import origin_of
 from marey.items.values import MAX_SEED
-from marey.motion.body import NamedBody
+from marey.motion.body import NamedBody, travel_scale
 from marey.motion.clip import MotionClip
 from marey.motion.edits.cuts import part
 from marey.motion.finish import finish_motion
@@ -26,6 +33,22 @@ from marey.text.features import TextFeatures
 PROMPTED_CONTEXT = 4
 """Frames that the model reads on a side where it also reads a prompt; with more it follows the prompt less
 (docs/decisions/0037-edits-by-a-model.md)."""
+
+
+@dataclass(frozen=True, eq=False)
+class NewFrames:
+    """New frames of a motion.
+
+    Attributes:
+        clip: on the body of the kept ones, at a place of its own; between others with one of each.
+        changes: what was changed and drawn, and the bearings, as manifests of motions have them.
+        before, after: metres by which the motion before and that after are higher than they were.
+    """
+
+    clip: MotionClip
+    changes: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    before: float = 0.0
+    after: float = 0.0
 
 
 @dataclass
@@ -45,6 +68,8 @@ class EditModel:
     control: GenerationControl | None = None
     errors: list[float] = field(default_factory=list[float])
     """Millimetres: `context_error` beside each gap since the last record."""
+    changes: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    """Of the new frames that were taken since the last record."""
 
     @classmethod
     def of(
@@ -76,16 +101,17 @@ class EditModel:
     def record(self) -> dict[str, Any]:
         """Return what decided the frames since the last record, for the manifest."""
         error, self.errors = max(self.errors, default=0.0), []
-        return {**origin_of(self.generator, self.settings), "context_error_mm": round(error, 1)}
+        changes, self.changes = self.changes, {}
+        return {**origin_of(self.generator, self.settings), "context_error_mm": round(error, 1), **changes}
 
-    def generate(self, prompt: str, seed: int, frames: int, fps: float, body: MotionClip) -> MotionClip:
+    def generate(self, prompt: str, seed: int, frames: int, fps: float, body: MotionClip) -> NewFrames:
         """Generate a motion of a prompt alone, on the body of a clip: `frames` frames at `fps`."""
         rate = self.generator.layout.fps
         count = max(math.ceil((frames - 1) / fps * rate) + 1, 2)
         made = frames_alone(self.generator, self.read(prompt), seed, count, self.settings, control=self.control)
         clip = self._clip(made.features, fps, body)
         gazing = with_gaze(replace(clip, manifest={**made.changes, "seed": seed}))
-        return part(gazing, 0, frames - 1)
+        return NewFrames(part(gazing, 0, frames - 1), made.changes)
 
     def between(
         self,
@@ -96,7 +122,8 @@ class EditModel:
         seed: int,
         *,
         force: bool = False,
-    ) -> MotionClip:
+        stay: bool = False,
+    ) -> NewFrames:
         """Generate the frames between two clips of one rate, with the last frame before and the first after them.
 
         Args:
@@ -106,9 +133,7 @@ class EditModel:
             prompt: None = the clips alone decide.
             seed: of the new frames.
             force: generate them although the model's tokens cannot show those beside them.
-
-        Returns:
-            The new frames with one of each clip, on their body, at a place of its own.
+            stay: the clip after keeps its place and height.
 
         Raises:
             InvalidInput: another skeleton than the model's, or frames that its tokens cannot show.
@@ -124,10 +149,11 @@ class EditModel:
         gap = (lead + wanted / fps) * rate
         count = max(1, round(gap) - (len(first) > 0)) if len(last) else math.ceil(gap) + 1
         self._check(first[-CONTEXT:], last[:CONTEXT], force=force)
-        window = self._filled(first, count, last, prompt, seed)
-        clip = self._clip(window.features, fps, body)
-        start = round(((window.first - 1) / rate + lead) * fps) if len(first) else 0
-        return part(clip, start, start + wanted)
+        before_gap, made = self._filled(first, count, last, prompt, seed, stay=stay)
+        clip = self._clip(made.features, fps, body)
+        start = round(((before_gap - 1) / rate + lead) * fps) if len(first) else 0
+        scale = travel_scale(layout.skeleton, body.skeleton)
+        return NewFrames(part(clip, start, start + wanted), made.changes, scale * made.before, scale * made.after)
 
     def _beside(self, clip: MotionClip | None, least: int) -> Float32:
         """Return the features of a clip beside a gap; none of fewer frames than `least`, which have no tokens."""
@@ -143,18 +169,21 @@ class EditModel:
         if not force:
             check_error(max(self.errors, default=0.0))
 
-    def _filled(self, before: Float32, frames: int, after: Float32, prompt: str | None, seed: int) -> Window:
-        """Fill a gap, with up to `CONTEXT` frames beside it."""
+    def _filled(
+        self, before: Float32, frames: int, after: Float32, prompt: str | None, seed: int, *, stay: bool
+    ) -> tuple[int, AskedFrames]:
+        """Fill a gap, with up to `CONTEXT` frames beside it; return their number before it, and all of these frames."""
         before, after = before[max(0, len(before) - CONTEXT) :], after[:CONTEXT]
-        start, end = len(before), len(before) + frames
         text = None if prompt is None else self.read(prompt)
         has_room = frames >= SHORTEST_S * self.generator.limits.fps
         if text is not None and has_room and asks_more(self.generator, text, self.settings):
-            new = frames_alone(self.generator, text, seed, frames, self.settings, control=self.control).features
-            made = joined(self.generator, before, new, after, seed, self.settings, control=self.control)
-            return Window(made, start, end)
+            beside = (before, frames, after)
+            return len(before), frames_between(
+                self.generator, *beside, text, seed, self.settings, stay=stay, control=self.control
+            )
         whole = np.concatenate([before, np.zeros((frames, before.shape[1]), np.float32), after])
-        return Window(self._continued(whole, start, end, prompt, seed), start, end)
+        made = self._continued(whole, len(before), len(before) + frames, prompt, seed)
+        return len(before), AskedFrames(made, {})
 
     def _continued(self, whole: Float32, start: int, end: int, prompt: str | None, seed: int) -> Float32:
         """Generate the frames from `start` to `end`, in several windows if there are many."""

@@ -7,7 +7,7 @@ new ones.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from marey.motion.clip import MotionClip
 from marey.motion.edits.concat import check_bodies, with_prompts
 from marey.motion.edits.cuts import frames_of, part
 from marey.motion.edits.joining import bridged
-from marey.motion.edits.place import posed
+from marey.motion.edits.place import posed, raised
 from marey.motion.edits.prompt_frames import prompts_of, resampled
 from marey.motion.edits.prompts import joined, with_own
 from marey.motion.edits.table import MOST_SEED
@@ -28,6 +28,8 @@ from marey.selector.records import match_of
 
 BLEND = 0.25
 """Seconds of new frames in which a difference to the kept ones fades."""
+Candidate: TypeAlias = tuple[MotionClip, Mapping[str, Any]]
+"""A result, and what was changed and drawn in its new frames."""
 
 
 def extend(clip: MotionClip, values: Mapping[str, Any], model: EditModel) -> MotionClip:
@@ -44,12 +46,13 @@ def extend(clip: MotionClip, values: Mapping[str, Any], model: EditModel) -> Mot
     frames = max(1, round(values["seconds"] * clip.fps))
     manifest = _with_own("extend", clip, own, [*known, [clip.frames, prompt]])
 
-    def make(seed: int) -> MotionClip:
-        piece = model.between(clip, frames, None, prompt, seed, force=values["force"])
-        piece, _ = bridged(clip, piece, None, _blend(clip))
-        return _whole(clip, clip, piece, None, manifest)
+    def make(seed: int) -> Candidate:
+        new = model.between(clip, frames, None, prompt, seed, force=values["force"])
+        before = raised(clip, new.before)
+        piece, _ = bridged(before, new.clip, None, _blend(clip))
+        return _whole(clip, before, piece, None, manifest), new.changes
 
-    return _best(make, values, prompt, clip.frames, clip.frames + frames - 1)
+    return _best(make, values, prompt, clip.frames, clip.frames + frames - 1, model)
 
 
 def in_between(clip: MotionClip, values: Mapping[str, Any], model: EditModel) -> MotionClip:
@@ -61,14 +64,16 @@ def in_between(clip: MotionClip, values: Mapping[str, Any], model: EditModel) ->
     check_bodies(clip, values["with"])
     other = resampled(values["with"], clip.fps)
     frames = max(1, round(values["seconds"] * clip.fps))
-    piece = model.between(clip, frames, other, values["prompt"], values["seed"], force=values["force"])
-    piece, after = bridged(clip, piece, other, _blend(clip))
+    new = model.between(clip, frames, other, values["prompt"], values["seed"], force=values["force"])
+    model.changes = new.changes
+    before = raised(clip, new.before)
+    piece, after = bridged(before, new.clip, raised(other, new.after), _blend(clip))
     own, end = values["prompt"], clip.frames + frames
     known = [*prompts_of(clip), *([[clip.frames, own]] if own else [])]
     manifest = _with_own("in-between", clip, own, known)
     later = [[frame + end, text] for frame, text in prompts_of(other)]
     whole = joined(manifest.get("prompt", ""), other.manifest.get("prompt", ""))
-    return _whole(clip, clip, piece, after, with_prompts(manifest, whole, [*known, *later]))
+    return _whole(clip, before, piece, after, with_prompts(manifest, whole, [*known, *later]))
 
 
 def repaint(clip: MotionClip, values: Mapping[str, Any], model: EditModel) -> MotionClip:
@@ -92,12 +97,16 @@ def repaint(clip: MotionClip, values: Mapping[str, Any], model: EditModel) -> Mo
     ]
     manifest = _with_own("repaint", clip, own, told)
 
-    def make(seed: int) -> MotionClip:
-        piece = model.between(before, last - first + 1, after, own, seed, force=values["force"])
-        piece, rest = bridged(before, piece, after, _blend(clip), stay=values["rest"] == "stay")
-        return _whole(clip, before, piece, rest, manifest)
+    def make(seed: int) -> Candidate:
+        stay = values["rest"] == "stay"
+        new = model.between(before, last - first + 1, after, own, seed, force=values["force"], stay=stay)
+        here, there = (
+            None if each is None else raised(each, up) for each, up in ((before, new.before), (after, new.after))
+        )
+        piece, rest = bridged(here, new.clip, there, _blend(clip), stay=stay)
+        return _whole(clip, here, piece, rest, manifest), new.changes
 
-    return _best(make, values, own, first, last)
+    return _best(make, values, own, first, last, model)
 
 
 def body_part(clip: MotionClip, values: Mapping[str, Any], model: EditModel) -> MotionClip:
@@ -115,24 +124,34 @@ def body_part(clip: MotionClip, values: Mapping[str, Any], model: EditModel) -> 
     rows = slice(first, last + 1)
     manifest = _with_own("body-part", clip, values["prompt"], [])
 
-    def make(seed: int) -> MotionClip:
-        made = model.generate(values["prompt"], seed, last - first + 1, clip.fps, clip)
+    def make(seed: int) -> Candidate:
+        new = model.generate(values["prompt"], seed, last - first + 1, clip.fps, clip)
+        made = new.clip
         rotations = clip.rotations.astype(np.float64)
         rotations[rows, joints] = slerp(rotations[rows, joints], made.rotations[:, joints].astype(np.float64), weight)
-        return posed(clip, rotations, clip.root, manifest=manifest)
+        return posed(clip, rotations, clip.root, manifest=manifest), new.changes
 
-    return _best(make, values, values["prompt"], first, last)
+    return _best(make, values, values["prompt"], first, last, model)
 
 
 def _best(
-    make: Callable[[int], MotionClip], values: Mapping[str, Any], prompt: str | None, first: int, last: int
+    make: Callable[[int], Candidate],
+    values: Mapping[str, Any],
+    prompt: str | None,
+    first: int,
+    last: int,
+    model: EditModel,
 ) -> MotionClip:
-    """Return the candidate whose new frames match the prompt best; the first of equal ones, and without a prompt."""
+    """Return the candidate whose new frames match the prompt best, and let the model record its changes; the first of
+    equal ones, and without a prompt."""
     count = values["candidates"] if prompt else 1
     found = [make((values["seed"] + number) % (MOST_SEED + 1)) for number in range(count)]
-    if count == 1:
-        return found[0]
-    return max(found, key=lambda each: match_of(part(each, first, last), [str(prompt)]).value or 0.0)
+
+    def match(candidate: Candidate) -> float:
+        return match_of(part(candidate[0], first, last), [str(prompt)]).value or 0.0
+
+    clip, model.changes = found[0] if count == 1 else max(found, key=match)
+    return clip
 
 
 def joints_of(skeleton: Skeleton, name: str) -> list[int]:

@@ -28,7 +28,7 @@ ENDS = 5
 """Frames at either end of a motion of which the floor is measured."""
 MOST_SCALED = 0.5
 """Share by which the height of a way down is changed at most, so that it begins where the way up has ended."""
-_FEET = [7, 8, 10, 11]
+FEET = [7, 8, 10, 11]
 _DOWN = re.compile(
     r"\b(?:climb|walk|run|go|goes|com|step|jump|leap|hop|slid|drop|rush|head|get|back|sneak|make|fall|tumbl)\w*"
     r"(?: (?:his|her|their|its) way)?(?: (?:back|right|straight|\w+ly))* down\b"
@@ -63,20 +63,30 @@ def raised_rows(rows: Sequence[tuple[str, str, Float32]], layout: FeatureLayout)
         if layout.skeleton.name != HUMANML3D.name or (level == 0.0 and action not in CLIMBS):
             found.append(RaisedRow(features))
             continue
-        floor = layout.decode(features)[:, _FEET, 1].min(axis=1)
+        floor = layout.decode(features)[:, FEET, 1].min(axis=1)
         begins, ends = float(floor[:ENDS].min()), float(floor[-ENDS:].min())
-        down = _DOWN.search(said) is not None
+        down = comes_down(said)
         if down and action in CLIMBS and level > 0.0 and begins > LEAST_M:
             share = float(np.clip(level / begins - 1, -MOST_SCALED, MOST_SCALED))
             found.append(RaisedRow(lifted(features, share * (floor - ends), layout), level))
         else:
             level = 0.0 if down else level
             found.append(RaisedRow(lifted(features, level, layout), level))
-        if down or (action == "climb-onto" and _OVER.search(said)):
+        if down or (action == "climb-onto" and passes_over(said)):
             level = 0.0
         elif action in CLIMBS and ends - begins > LEAST_M:
             level += ends - begins
     return found
+
+
+def comes_down(said: str) -> bool:
+    """Return True if words, in lower case, have a body come down from where it is."""
+    return _DOWN.search(said) is not None
+
+
+def passes_over(said: str) -> bool:
+    """Return True if words, in lower case, name what is passed over, not climbed onto."""
+    return _OVER.search(said) is not None
 
 
 def lifted(features: Float32, metres: float | Array, layout: FeatureLayout) -> Float32:
