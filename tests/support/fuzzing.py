@@ -9,18 +9,23 @@ from __future__ import annotations
 import io
 import signal
 import sys
+import tarfile
+import tempfile
 import warnings
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from random import Random
 
 import numpy as np
 
 from marey.core.errors import InvalidFile, InvalidInput, TooLarge
 from marey.core.memory import limit_memory
+from marey.data.archive import bvh_files
 from marey.exporters import Coordinates, exporters
+from marey.motion.body_files import read_body
 from marey.motion.clip import parse_npz
 from marey.motion.export_options import ExportOptions
 from marey.motion.io.bvh import parse_bvh
@@ -31,6 +36,7 @@ from marey.motion.io.rig_smplx import JOINTS, VERTICES
 from marey.motion.retarget.reference import reference_rig
 from marey.motion.rigs.body import RigBody
 from marey.motion.rigs.read import parse_rig
+from marey.motion.skeleton import HUMANML3D
 from tests.support.archives import archive
 from tests.support.damage import damaged, damaged_glb, damaged_npz, damaged_text
 from tests.support.fbx import rewritten
@@ -75,6 +81,34 @@ def document_of(glb: bytes) -> bytes:
     return glb[20 : 20 + int.from_bytes(glb[12:16], "little")]
 
 
+def packed(mode: str) -> bytes:
+    """An archive of captures, compressed in a way that `tarfile` knows."""
+    file = io.BytesIO()
+    with tarfile.open(fileobj=file, mode=f"w:{mode}", format=tarfile.PAX_FORMAT) as tar:
+        for name in ("set/walk.bvh", f"set/{'long' * 40}.bvh", "set/ä.bvh", "set/index.csv"):
+            content = written("bvh")[:6000] if name.endswith("bvh") else b"a,b\n"
+            member = tarfile.TarInfo(name)
+            member.size = len(content)
+            tar.addfile(member, io.BytesIO(content))
+    return file.getvalue()
+
+
+def unpack(data: bytes) -> None:
+    """Reads all members of an archive of captures."""
+    with tempfile.NamedTemporaryFile(suffix=".tar") as file:
+        Path(file.name).write_bytes(data)
+        for _ in bvh_files(Path(file.name)):
+            pass
+
+
+def body(data: bytes) -> None:
+    """Reads proportions from an npz; a body that no human has is refused as a parameter is."""
+    with tempfile.NamedTemporaryFile(suffix=".npz") as file:
+        Path(file.name).write_bytes(data)
+        with suppress(InvalidInput):
+            read_body(Path(file.name), HUMANML3D)
+
+
 def smplx_model() -> bytes:
     random = np.random.default_rng(1)
     file = io.BytesIO()
@@ -115,7 +149,8 @@ FORMATS = {
             for name in ("mixamo", "ue4", "humanik")
         },
     ),
-    "npz": Format(damaged_npz, (parse_npz,), {"plain": lambda: walker(seconds=0.5).to_npz()}),
+    "npz": Format(damaged_npz, (parse_npz, body), {"plain": lambda: walker(seconds=0.5).to_npz()}),
+    "archive": Format(damaged, (unpack,), {mode or "plain": partial(packed, mode) for mode in ("", "gz", "bz2", "xz")}),
     "smplx": Format(damaged_npz, (rig("npz"),), {"model": smplx_model}),
 }
 

@@ -12,9 +12,6 @@ import pytest
 from marey.core.errors import InvalidInput
 from marey.motion import MotionClip, edit
 from marey.motion.arrange import moved, placement_of
-from marey.motion.edits.loop_bars import Bars, Fault
-from marey.motion.edits.loop_blend import closed
-from marey.motion.edits.loop_ease import eased, smoothed
 from marey.motion.edits.loop_feet import on_the_spot, onsets, standing_spans, stands, supports
 from marey.motion.edits.loop_search import cycles, has_steps
 from marey.motion.edits.steps import read_steps
@@ -22,61 +19,17 @@ from marey.motion.edits.timeline_rows import cut_rows, prompt_after_cuts
 from marey.motion.export_options import ExportOptions
 from marey.motion.feet import find_contacts, skate
 from marey.motion.kinematics import forward_kinematics
-from marey.motion.pose import solve_pose
 from marey.motion.retarget.apply import on_body
 from marey.motion.retarget.load import load_body
 from marey.motion.rotations import about, from_rotvec, multiply, rotate
 from marey.motion.skeleton import HUMANML3D
 from tests.support import bodies
-from tests.support.motions import drift
-
-LOOP = {"op": "loop"}
+from tests.support.loops import LOOP, idle, run, swaying, thrice, walked
 
 
 @pytest.fixture(scope="module")
 def walk() -> MotionClip:
     return walked()
-
-
-def walked(seconds: float = 6.0) -> MotionClip:
-    """A walk that sways a little, so that no two cycles are equal."""
-    return swaying(bodies.Body(seconds, speed=lambda t: 1.1 + 0 * t))
-
-
-def swaying(body: bodies.Body) -> MotionClip:
-    """A body whose arms and trunk swing with its steps, and drift a little."""
-    pose = solve_pose(body.joints(), HUMANML3D, fps=bodies.FPS)
-    rotations, phase = pose.rotations.copy(), np.pi * body.cadence * np.arange(len(pose.root)) / bodies.FPS
-    for number, name in enumerate(("spine1", "spine2", "neck", "L_shoulder", "R_shoulder", "L_elbow", "R_elbow")):
-        joint = HUMANML3D.index(name)
-        swing = np.outer(np.sin(phase + (np.pi if name[0] == "L" else 0.0)), [0.4, 0.1, 0.1])
-        rotations[:, joint] = multiply(rotations[:, joint], from_rotvec(swing + drift(number, len(rotations), 3, 0.01)))
-    root = pose.root + np.outer(np.sin(2 * phase), [0.0, 0.01, 0.02])
-    contacts = find_contacts(pose.joints, pose.skeleton, bodies.FPS)
-    return MotionClip.of(pose.skeleton, rotations, root, contacts, bodies.FPS)
-
-
-def run() -> MotionClip:
-    """A run of four steps; its right foot never stands still for two frames."""
-    return swaying(bodies.Body(1.4, speed=lambda t: 3.5 + 0 * t, duty=0.2, cadence=3.0))
-
-
-def idle(seconds: float) -> MotionClip:
-    """A body that sways on standing feet."""
-    frames = round(20 * seconds)
-    rotations = np.zeros((frames, 22, 4))
-    rotations[..., 0] = 1.0
-    arms = from_rotvec(drift(3, frames, 3, 0.08))
-    for name in ("spine2", "L_shoulder", "R_shoulder"):
-        joint = HUMANML3D.index(name)
-        rotations[:, joint] = multiply(arms, rotations[:, joint])
-    root = np.tile([0.0, 0.94, 0.0], (frames, 1))
-    return MotionClip.of(HUMANML3D, rotations, root, np.ones((frames, 4), bool), 20.0)
-
-
-def thrice(loop: MotionClip) -> MotionClip:
-    (played,) = edit(loop, [{"op": "concat", "with": loop}] * 2)
-    return played
 
 
 def test_a_walk_is_played_on_without_a_seam(walk):
@@ -322,90 +275,9 @@ def test_both_feet_step_in_the_cycle_wherever_its_seam_is():
             assert steps[cycle.first - earlier + 1 : cycle.last - earlier + 1].any(axis=0).all()
 
 
-def test_a_slower_blend_moves_a_runner_less_and_meets_the_source_at_both_ends():
-    clip = run()
-    cycle = next(each for each in cycles(clip, clip.contacts, 6, 100) if each.first >= 6)
-    usual, slower = (closed(clip, clip.contacts, cycle, 6, frames) for frames in (0.0, 0.25))
-    places = [forward_kinematics(clip.skeleton, each.rotations, each.root) for each in (usual, slower)]
-    np.testing.assert_allclose(places[1][:-6], places[0][:-6])
-    np.testing.assert_allclose(places[1][-1], slower.travel.places(places[1][0]), atol=1e-6)
-    way = [np.linalg.norm(np.diff(each[:, 0], axis=0), axis=-1) for each in places]
-    assert 0.88 < way[1][-5:-1].mean() / way[0][-5:-1].mean() < 0.97
-    assert way[1][[-6, -1]] == pytest.approx(way[0][[-6, -1]], rel=0.03)
-
-
-def test_slower_blends_are_tried_before_a_motion_is_refused(monkeypatch):
-    asked: list[float] = []
-
-    def noted(*given):
-        asked.append(given[4])
-        return closed(*given)
-
-    monkeypatch.setattr("marey.motion.edits.loop.closed", noted)
-    monkeypatch.setattr(Bars, "best", lambda *_: Fault(2.0, "a joint jumps"))
-    with pytest.raises(InvalidInput, match="a joint jumps"):
-        edit(walked(), [LOOP])
-    assert asked == sorted(asked)
-    assert set(asked) == {0.0, 0.04 * 6}
-
-
-@pytest.mark.parametrize("speed", [1.0, 1.6])
-def test_a_short_walk_loops_by_a_blend_that_is_changed(speed, monkeypatch):
-    """Two gait cycles leave few candidates, and each misses a bar by some percent."""
-    clip = swaying(bodies.Body(1.8, speed=lambda t: speed + 0 * t, duty=0.6, cadence=1.8))
-    (loop,) = edit(clip, [LOOP])
-    blend, played = loop.manifest["loop"]["blend_frames"], thrice(loop).joints
-    own = slice(loop.frames - 1 - blend["last"], loop.frames - 1 + blend["first"])
-    for number in (1, 2):
-        source, found = (np.linalg.norm(np.diff(joints, number, axis=0), axis=-1) for joints in (clip.joints, played))
-        assert (found[own].max(axis=0) <= 1.1 * source.max(axis=0) + 2e-4).all()
-    monkeypatch.setattr("marey.motion.edits.loop.eased", lambda *_: Fault(2.0, "it stays as it is"))
-    with pytest.raises(InvalidInput, match=r"\d mm (in the blend|at the seam), "):
-        edit(clip, [LOOP])
-
-
-def test_a_smoothed_blend_keeps_its_ends_and_standing_feet(walk):
-    cycle = next(each for each in cycles(walk, walk.contacts, 6, 100) if each.first >= 6)
-    plain = closed(walk, walk.contacts, cycle, 6)
-    after = smoothed(walk, plain, np.array([2.0, 2.0, 2.0, 0.0]))
-    was, now = (forward_kinematics(walk.skeleton, each.rotations, each.root) for each in (plain, after))
-    np.testing.assert_allclose(now[:-6], was[:-6], atol=1e-9)
-    np.testing.assert_allclose(now[-1], was[-1], atol=1e-9)
-    wrists = [walk.skeleton.index(name) for name in ("R_wrist", "L_wrist")]
-    bend = [np.linalg.norm(np.diff(each[-7:, wrists[0]], 2, axis=0), axis=-1) for each in (was, now)]
-    assert bend[1].max() < bend[0].max()
-    free = walk.skeleton.index("L_elbow")  # strength 0
-    np.testing.assert_allclose(after.rotations[:, free], plain.rotations[:, free], atol=1e-9)
-    held = np.repeat(stands(plain.contacts), 2, axis=1)[-6:-1]
-    moved = np.linalg.norm((now - was)[-6:-1][:, list(walk.skeleton.feet)], axis=-1)
-    assert held.any()
-    assert moved[held].max() < 2e-3
-    assert np.linalg.norm((now - was)[-6:-1], axis=-1).max() > 5e-3
-
-
-def test_a_loop_that_misses_a_bar_by_far_is_judged_once(walk):
-    cycle = next(iter(cycles(walk, walk.contacts, 6, 100)))
-    asked: list[object] = []
-    assert eased(walk, walk.contacts, cycle, 6, lambda loop: asked.append(loop) or Fault(3.0, "far")) == Fault(3, "far")
-    assert len(asked) == 1
-
-
 def test_all_pairs_are_tried_before_a_motion_is_refused(walk):
     few, all_ = ({(each.first, each.last) for each in cycles(walk, walk.contacts, 6, 10_000, n)} for n in (1, 0))
     assert few < all_
-
-
-def test_the_reason_of_a_refusal_is_the_bar_that_is_missed_most(walk):
-    """Of two bars that are missed, the smaller miss would say that the motion is nearly a loop."""
-    bars = Bars(walk)
-    faults = 0
-    for cycle in cycles(walk, walk.contacts, 6, 60):
-        begun = cycle.first + 5, cycle.last  # no whole gaits: its blend hurries
-        found = bars.best(closed(walk, walk.contacts, replace(cycle, first=begun[0], last=begun[1]), 6))
-        if isinstance(found, Fault) and "in the blend" in found.reason:
-            faults += 1
-            assert found.excess > 1.5
-    assert faults > 10
 
 
 def treadmill(clip: MotionClip) -> MotionClip:
@@ -427,12 +299,21 @@ def test_a_walk_on_the_spot_keeps_whole_gait_cycles():
     assert loop.manifest["loop"]["cycle"]["z"] == pytest.approx(0, abs=0.01)
 
 
+def test_a_walk_on_the_spot_is_still_for_a_frame_now_and_then():
+    clip = treadmill(walked(3.4))
+    contacts = clip.contacts.copy()
+    contacts[10::10, 1] = True
+    expected = on_the_spot(clip.joints, clip.contacts, clip.skeleton)
+    assert expected.any()
+    np.testing.assert_array_equal(on_the_spot(clip.joints, contacts, clip.skeleton), expected)
+
+
 @pytest.mark.parametrize("case", ["stands", "travels", "one foot"])
 def test_other_bodies_do_not_walk_on_the_spot(case, walk):
     clip = treadmill(walk)
     joints, contacts = clip.joints.astype(np.float64), clip.contacts.copy()
     if case == "stands":
-        contacts[3, 0] = True
+        contacts[: len(contacts) // 3, 0] = True
     elif case == "travels":
         joints = walk.joints.astype(np.float64)
     else:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from marey.core.errors import InvalidInput
+from marey.motion.clip import MotionClip
 from marey.motion.export_options import ExportOptions
 from marey.motion.retarget.apply import on_body
 from marey.motion.retarget.load import load_body
@@ -13,7 +14,7 @@ from marey.motion.retarget.reference import REFERENCES, reference_rig
 from marey.motion.retarget.retarget import retarget
 from marey.motion.retarget.source import source_of
 from marey.motion.rigs.body import RigBody
-from marey.motion.rotations import angle_between
+from marey.motion.rotations import Array, angle_between, from_rotvec, normalize
 from marey.motion.skeleton import HUMANML3D
 from tests.support.changed_rigs import Change, lively, source_on_rig
 from tests.support.walker import walker
@@ -80,6 +81,36 @@ def test_to_a_body_of_other_proportions_and_back():
     there = on_body(LIVELY, load_body("mixamo"))
     back = retarget(source_on_rig(there), source.body).world()[1]
     assert np.linalg.norm(back - LIVELY.joints, axis=-1).mean() <= 0.02
+
+
+def knee_of(places: Array, body: RigBody) -> Array:
+    """Return the bend (T,) of the right knee, degrees."""
+    hip, knee, ankle = (places[:, body.map.parts[f"right_{part}"]] for part in ("upper_leg", "lower_leg", "foot"))
+    return np.degrees(np.arccos((normalize(knee - hip) * normalize(ankle - knee)).sum(axis=-1)))
+
+
+@pytest.mark.parametrize("name", ["mixamo", "humanik"])
+def test_the_knee_of_a_leg_that_swings_bends_as_the_sources_however_the_foot_is_pitched(name):
+    """A foot that is longer or steeper than the source's would draw the ankle along if its toe went where the source's
+    goes."""
+    frames = 40
+    rotations = np.tile([1.0, 0.0, 0.0, 0.0], (frames, 22, 1))
+    swing = 0.4 + 0.6 * np.sin(np.linspace(0.0, np.pi, frames))
+    for joint, most in (("R_hip", -0.8), ("R_knee", 1.3), ("R_ankle", 0.9)):
+        rotations[:, HUMANML3D.index(joint)] = from_rotvec(np.outer(most * swing, [1.0, 0.0, 0.0]))
+    stands = np.tile([True, True, False, False], (frames, 1))
+    root = np.tile(HUMANML3D.rest[0] - [0.0, HUMANML3D.rest[:, 1].min(), 0.0], (frames, 1))
+    clip = MotionClip.of(HUMANML3D, rotations, root, stands, 20.0)
+    source, body = source_of(clip), load_body(name)
+    bend = knee_of(source.joints, source.body)
+    places = retarget(source, body).world()[1]
+    assert bend.max() > 70
+    assert np.abs(knee_of(places, body) - bend).max() < 1.5
+    toe, theirs = (
+        places[:, each.map.parts["right_toes"], 1] - each.at("right_toes")[1]
+        for each, places in ((body, places), (source.body, source.joints))
+    )
+    assert (toe > np.minimum(body.leg / source.body.leg * theirs, 0.0) - 1e-3).all()
 
 
 def test_helpers_of_unreal_follow_hands_and_feet():

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import lzma
 import tarfile
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 
-from marey.core.errors import InvalidFile, NotFound, TooLarge
+from marey.core.errors import InvalidFile, MareyError, NotFound, TooLarge
 
 MAX_FILE_BYTES = 64 * 2**20  # the largest file of the two archives has 11 MB
 MAX_TOTAL_BYTES = 4 * 2**30  # the larger archive unpacks to 548 MB; stops decompression bombs
@@ -79,7 +78,9 @@ def _archive(path: Path, passed_over: Counter[str]) -> Iterator[tuple[str, bytes
                 if len(data) != member.size:
                     raise InvalidFile("is truncated", where=f"{path}: {member.name}")
                 yield name.stem, data
-    except (tarfile.TarError, lzma.LZMAError, EOFError, OSError) as error:
+    except MareyError:
+        raise
+    except Exception as error:  # a crafted header makes tarfile raise nearly any exception
         raise InvalidFile(f"not a readable archive: {error}", where=str(path)) from error
 
 

@@ -56,8 +56,6 @@ def loop(clip: MotionClip, values: Mapping[str, Any]) -> MotionClip:
     spare: tuple[Closed, Cycle] | None = None
     for window, slower in _blends(clip, contacts, values["blend"]):
         for cycle in cycles(clip, contacts, window, TRIED):
-            if slower and cycle.first < window:
-                continue
             found = bars.best(closed(clip, contacts, cycle, window, slower * window))
             if isinstance(found, Closed):
                 if found.hitch <= 1.0:

@@ -2,8 +2,9 @@
 
 The frame after the last is the one after the first, moved on by the travel of a cycle. So the last frames fade from the
 source to the frames before `first`, moved on in the same way: at the end places, speeds and accelerations agree. Where
-the source begins too late for that, the difference at the end fades in by a Hermite curve. The seam of the loop may be
-anywhere in the blend. A blend may also show a fraction of a frame less than it is long: joints move less in it.
+the source begins too late for that, the frames before it are the movement after its beginning, turned round there:
+places and speeds agree, and of these frames the blend shows the least. The seam of the loop may be anywhere in the
+blend. A blend may also show a fraction of a frame less than it is long: joints move less in it.
 """
 
 from __future__ import annotations
@@ -14,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.motion.clip import MotionClip
-from marey.motion.edits.joining import fade
 from marey.motion.edits.loop_search import Cycle
 from marey.motion.filters import smootherstep
 from marey.motion.kinematics import facing, forward_kinematics
@@ -25,13 +25,11 @@ from marey.motion.rotations import (
     Array,
     about,
     conjugate,
-    from_rotvec,
     length,
     multiply,
     normalize,
     rotate,
     slerp,
-    to_rotvec,
     unroll,
 )
 
@@ -135,22 +133,16 @@ def closed(clip: MotionClip, contacts: Bool, cycle: Cycle, window: int, slower: 
 
     Args:
         slower: frames that the blend shows less of the source than it is long: it is slower, so that joints move less
-            at the seam. 0 where the source begins too late for a blend of two movements.
+            at the seam.
     """
     window = min(window, cycle.last - cycle.first - 1)
-    slower = slower if cycle.first >= window else 0.0
     travel = travel_of_cycle(clip, contacts, cycle, slower)
     whole = slice(cycle.first, cycle.last + 1)
     rotations = unroll(clip.rotations[whole].astype(np.float64))
     root = clip.root[whole].astype(np.float64)
     feet = contacts[whole].copy()
     end = slice(len(root) - 1 - window, len(root))
-    if cycle.first >= window:
-        blended, stands = _cross_faded(clip, contacts, travel, cycle, window, slower)
-        feet[end] = stands
-    else:
-        blended = _faded_in(clip, travel, rotations, root, cycle, window)
-    rotations[end], root[end] = blended
+    (rotations[end], root[end]), feet[end] = _cross_faded(clip, contacts, travel, cycle, window, slower)
     rotations[-1], root[-1] = travel.turns(rotations[0]), travel.places(root[0])
     feet[-1] = feet[0]
     return Closed(unroll(rotations), root, feet, travel, window, min(window, cycle.first))
@@ -171,38 +163,25 @@ def _cross_faded(
     joints = [forward_kinematics(clip.skeleton, r, p) for r, p in ((rotations, root), (theirs, place))]
     wanted = joints[0] + share[:, None, None] * (joints[1] - joints[0])
     later = frames > window / 2
-    stands = np.where(later[:, None], *(contacts[np.rint(each).astype(np.intp)] for each in (begun, mine)))
+    stands = np.where(later[:, None], *(contacts[np.rint(np.abs(each)).astype(np.intp)] for each in (begun, mine)))
     return (with_feet(clip, mixed, middle, wanted), middle), stands
 
 
 def _at(clip: MotionClip, times: Array) -> tuple[Array, Array]:
-    """Return rotations (n, J, 4) and root (n, 3) at times (n,), counted in frames."""
-    whole = np.rint(times).astype(np.intp)
-    if np.array_equal(whole, times):
-        return clip.rotations[whole].astype(np.float64), clip.root[whole].astype(np.float64)
-    return interpolate_rotations(clip.rotations, times), interpolate(clip.root.astype(np.float64), times)
-
-
-def _faded_in(
-    clip: MotionClip, travel: Travel, rotations: Array, root: Array, cycle: Cycle, window: int
-) -> tuple[Array, Array]:
-    """Add the difference at the seam to the last frames, from nothing: in place and speed it meets the beginning."""
-    begin = slice(cycle.first, cycle.first + 2)
-    theirs, place = travel.turns(clip.rotations[begin]), travel.places(clip.root[begin].astype(np.float64))
-    after = min(cycle.last + 1, clip.frames - 1)
-    ours = clip.rotations[[after - 1, after]].astype(np.float64)
-    path = clip.root[[after - 1, after]].astype(np.float64)
-    turn = to_rotvec(multiply(theirs[0], conjugate(rotations[-1])))
-    bend = to_rotvec(multiply(theirs[1], conjugate(theirs[0]))) - to_rotvec(multiply(ours[1], conjugate(ours[0])))
-    k = np.arange(window, -1, -1, dtype=np.float64)[:, None]
-    turns = from_rotvec(fade(turn, -bend, k[..., None], window))
-    shifts = fade(place[0] - root[-1], -(place[1] - place[0] - path[1] + path[0]), k, window)
-    end = slice(len(root) - 1 - window, len(root))
-    mixed, middle = multiply(turns, rotations[end]), root[end] + shifts
-    joints = forward_kinematics(clip.skeleton, rotations[end], root[end])
-    goal = travel.places(clip.joints[cycle.first].astype(np.float64))
-    share = fade(np.ones(1), np.zeros(1), k, window)[..., None]
-    return with_feet(clip, mixed, middle, joints + share * (goal - joints[-1])), middle
+    """Return rotations (n, J, 4) and root (n, 3) at times (n,), counted in frames; before the first frame, those of the
+    movement after it, turned round there."""
+    after = np.abs(times)
+    whole = np.rint(after).astype(np.intp)
+    if np.array_equal(whole, after):
+        rotations, root = clip.rotations[whole].astype(np.float64), clip.root[whole].astype(np.float64)
+    else:
+        rotations = interpolate_rotations(clip.rotations, after)
+        root = interpolate(clip.root.astype(np.float64), after)
+    early = times < 0
+    begin = clip.rotations[0].astype(np.float64)
+    rotations[early] = multiply(multiply(begin, conjugate(rotations[early])), begin)
+    root[early] = 2 * clip.root[0].astype(np.float64) - root[early]
+    return rotations, root
 
 
 def with_feet(clip: MotionClip, rotations: Array, root: Array, wanted: Array) -> Array:

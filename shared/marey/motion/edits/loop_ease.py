@@ -59,7 +59,7 @@ def eased(
     nearest = judged(values)
     for step in STEPS:
         while isinstance(nearest, Fault) and nearest.excess <= NEAR:
-            for other in _around(values, step, slower=cycle.first >= window):
+            for other in _around(values, step):
                 found = judged(other)
                 if isinstance(found, Closed) or found.excess < nearest.excess - GAIN:
                     values, nearest = other, found
@@ -69,10 +69,10 @@ def eased(
     return nearest
 
 
-def _around(values: Array, step: float, *, slower: bool) -> Iterator[Array]:
+def _around(values: Array, step: float) -> Iterator[Array]:
     """Yield values (1 + P,) that differ by a step: in how slow the blend is, in all parts, or in one."""
     slow, *parts = np.eye(len(values))
-    for direction in [*([slow] if slower else []), 1.0 - slow, *parts]:
+    for direction in [slow, 1.0 - slow, *parts]:
         for sign in (step, -step):
             other = np.clip(values + sign * direction, 0.0, 1.0)
             if (other != values).any():

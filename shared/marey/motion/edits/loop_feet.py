@@ -21,6 +21,8 @@ LOW = 0.08
 """Largest height of a carrying toe over its lowest, metres."""
 SPOT = 0.1
 """Metres within which the root of a body stays that walks on the spot, as on a treadmill."""
+STILL = 0.25
+"""Share of the frames in which a foot of such a body stands at most: it is still where it turns back, for a frame."""
 
 
 def supports(joints: Array, contacts: Bool, skeleton: Skeleton, fps: float) -> Bool:
@@ -47,14 +49,14 @@ def supports(joints: Array, contacts: Bool, skeleton: Skeleton, fps: float) -> B
 
 def on_the_spot(joints: Array, contacts: Bool, skeleton: Skeleton) -> Bool:
     """Return where the feet (T, 2) carry a body that walks on the spot: the lower one, if the body stays at its place,
-    both feet come near the floor in turn, and none ever stands still; else nowhere.
+    both feet come near the floor in turn, and hardly one ever stands still; else nowhere.
 
     Clips of games are made so: the root stays, and the feet move against the floor all the time.
     """
     joints = np.asarray(joints, np.float64)
     none = np.zeros((len(joints), 2), bool)
     toes = joints[:, list(skeleton.feet[1::2])]
-    if contacts.any() or np.ptp(joints[:, 0, [0, 2]], axis=0).max() > SPOT:
+    if stands(contacts).any(axis=1).mean() > STILL or np.ptp(joints[:, 0, [0, 2]], axis=0).max() > SPOT:
         return none
     near = toes[..., 1] < min(toes[..., 1].min(), FLOOR_BAND[1]) + LOW
     alone = near & ~near[:, ::-1]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections import Counter
 from collections.abc import Iterable
+from functools import lru_cache
 
 from marey.motion.io.fbx_nodes import (
     CREATION_TIME,
@@ -46,6 +47,12 @@ def ticks(frame: int, fps: float) -> Long:
     return Long(round(frame * TICKS / fps))
 
 
+@lru_cache(maxsize=4096)  # the files of many motions on one rig have the same objects
+def _identifier(key: tuple[object, ...]) -> Long:
+    digest = hashlib.sha256(repr(key).encode()).digest()
+    return Long(int.from_bytes(digest[:8], "little") >> 12)
+
+
 class FbxDocument:
     """Objects and connections of a file; identifiers are hashes, so that equal input gives equal bytes."""
 
@@ -57,8 +64,7 @@ class FbxDocument:
     def identifier(self, *key: object) -> Long:
         """Return the identifier of a key: 52 bits, since readers in JavaScript keep no more."""
         for attempt in range(2**10):
-            digest = hashlib.sha256(repr((*key, attempt)).encode()).digest()
-            number = Long(int.from_bytes(digest[:8], "little") >> 12)
+            number = _identifier((*key, attempt))
             if number not in self._taken:
                 self._taken.add(number)
                 return number

@@ -47,12 +47,15 @@ class FbxNode:
         properties: bool, int (32 bits), `Long`, float (64 bits), str, bytes or array.
         children: nodes below it.
         block: it may have children, so that an end of the list is written even if there are none.
+        content: its bytes after the place where it ends, once they are known: times and flags stand in hundreds of
+            curves of a file, and what never changes in every file. A node is not changed after it is written.
     """
 
     name: str
     properties: tuple[Property, ...] = ()
     children: tuple[FbxNode, ...] = ()
     block: bool = field(default=False, repr=False)
+    content: bytes | None = field(default=None, init=False, repr=False)
 
     def first(self, name: str) -> FbxNode | None:
         """Return the first child of a name."""
@@ -69,31 +72,26 @@ def node(
 def encode(top: list[FbxNode]) -> bytes:
     """Return the bytes of a file with these nodes at its top."""
     data = bytearray(MAGIC + struct.pack("<I", VERSION))
-    known: dict[int, bytes] = {}
     for each in top:
-        _append(data, each, known)
+        _append(data, each)
     data += bytes(13) + FOOTER_ID
     data += bytes(16 - len(data) % 16)
     data += bytes(4) + struct.pack("<I", VERSION) + bytes(120) + FOOTER_MAGIC
     return bytes(data)
 
 
-def _append(data: bytearray, each: FbxNode, known: dict[int, bytes]) -> None:
-    """Append a node with all below it: it begins with the place where it ends.
-
-    Args:
-        known: content by the node's `id`, of nodes without children: times and flags stand in hundreds of curves.
-    """
+def _append(data: bytearray, each: FbxNode) -> None:
+    """Append a node with all below it: it begins with the place where it ends."""
     start = len(data)
     data += bytes(4)
     data += _content(each)
     for child in each.children:
         if child.children or child.block:
-            _append(data, child, known)
+            _append(data, child)
             continue
-        content = known.get(id(child))
+        content = child.content
         if content is None:
-            content = known[id(child)] = _content(child)
+            content = child.content = _content(child)
         data += _LENGTH.pack(len(data) + 4 + len(content))
         data += content
     if each.children or each.block:

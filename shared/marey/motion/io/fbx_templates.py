@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from functools import cache
 
 from marey.motion.io.fbx_nodes import FbxNode, Long, Property, node
 
@@ -116,15 +117,20 @@ def prop(name: str, kind: str, values: Iterable[float] | str, flags: str | None 
     return node("P", name, label, sub, flags, *(number(value) for value in values))
 
 
+@cache
+def _template(kind: str) -> FbxNode:
+    name, properties = TEMPLATES[kind]
+    rows = [prop(*each) for each in properties]
+    return node("PropertyTemplate", name, below=[node("Properties70", below=rows)])
+
+
 def definitions(counts: Mapping[str, int]) -> FbxNode:
     """Return the node `Definitions`: how many objects of each type follow, and their templates."""
     types: list[FbxNode] = [node("ObjectType", "GlobalSettings", below=[node("Count", 1)])]
     for kind, count in counts.items():
         below = [node("Count", count)]
         if kind in TEMPLATES:
-            name, properties = TEMPLATES[kind]
-            rows = [prop(*each) for each in properties]
-            below.append(node("PropertyTemplate", name, below=[node("Properties70", below=rows)]))
+            below.append(_template(kind))
         types.append(node("ObjectType", kind, below=below))
     total = 1 + sum(counts.values())
     return node("Definitions", below=[node("Version", 100), node("Count", total), *types])

@@ -105,6 +105,21 @@ def add_motion(document: FbxDocument, poses: FilePoses) -> list[Long]:
     return models
 
 
+_OF_JOINTS = (
+    prop("RotationActive", "bool", (1,)),
+    prop("InheritType", "enum", (1,)),
+    prop("ScalingMax", "vector", (0, 0, 0)),
+    prop("DefaultAttributeIndex", "int", (0,)),
+)
+_UNTURNED = prop("Lcl Rotation", "Lcl Rotation", (0, 0, 0), "A+")
+_OF_MODELS = node("Version", 232), node("Shading", True), node("Culling", "CullingOff")
+_ATTRIBUTES = {
+    "LimbNode": (node("Properties70", below=[prop("Size", "double", (1,))]), node("TypeFlags", "Skeleton")),
+    "Null": (node("TypeFlags", "Null"),),
+}
+"""Contents of the attribute of a model by its kind."""
+
+
 def _add_joints(document: FbxDocument, poses: FilePoses) -> list[Long]:
     pre = to_euler(poses.turns, ORDER)[:, ::-1]
     models: list[Long] = []
@@ -114,31 +129,22 @@ def _add_joints(document: FbxDocument, poses: FilePoses) -> list[Long]:
         scale = 1.0 if poses.scales is None else float(poses.scales[joint])
         rows = [
             prop("PreRotation", "vector", pre[joint] + 0.0),
-            prop("RotationActive", "bool", (1,)),
-            prop("InheritType", "enum", (1,)),
-            prop("ScalingMax", "vector", (0, 0, 0)),
-            prop("DefaultAttributeIndex", "int", (0,)),
+            *_OF_JOINTS,
             prop(
                 "Lcl Translation", "Lcl Translation", poses.places[joint] + 0.0, "A+" if joint in poses.moving else "A"
             ),
-            prop("Lcl Rotation", "Lcl Rotation", (0, 0, 0), "A+"),
+            _UNTURNED,
             prop("Lcl Scaling", "Lcl Scaling", (scale,) * 3),
         ]
         models.append(document.add("Model", name, "Model", kind, _model(rows)))
         document.connect(models[-1], models[parent] if parent >= 0 else 0)
-        size = [node("Properties70", below=[prop("Size", "double", (1,))])] if limb else []
-        below = [*size, node("TypeFlags", "Skeleton" if limb else "Null")]
-        document.connect(document.add("NodeAttribute", name, "NodeAttribute", kind, below), models[-1])
+        document.connect(document.add("NodeAttribute", name, "NodeAttribute", kind, _ATTRIBUTES[kind]), models[-1])
     return models
 
 
 def _model(rows: list[FbxNode]) -> list[FbxNode]:
-    return [
-        node("Version", 232),
-        node("Properties70", below=rows),
-        node("Shading", True),
-        node("Culling", "CullingOff"),
-    ]
+    version, *shading = _OF_MODELS
+    return [version, node("Properties70", below=rows), *shading]
 
 
 def _add_bind_pose(document: FbxDocument, poses: FilePoses, models: list[Long]) -> None:

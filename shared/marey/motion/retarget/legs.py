@@ -1,7 +1,8 @@
 """Legs of a retargeted body: feet stand where the source's stand, at the scale of the legs, on the target's own floor.
 
-Toes have goals; ankles follow from the turn of the foot, knees by two-bone inverse kinematics. Where a leg is too
-short, the heel comes up, then the hips come down (`marey.motion.legs`).
+Toes have goals; ankles follow from the turn of the foot, knees by two-bone inverse kinematics. While a foot swings, its
+ankle goes where the source's goes, so that a knee bends as the source's although the foot is longer or steeper. Where a
+leg is too short, the heel comes up, then the hips come down (`marey.motion.legs`).
 """
 
 from __future__ import annotations
@@ -66,6 +67,14 @@ class Stance:
         widths = [np.linalg.norm(b.at("left_upper_leg") - b.at("right_upper_leg")) for b in (self.target, self.source)]
         self.wider = float(widths[0] - self.scale * widths[1]) / 2
 
+    def shift(self, ahead: Array, fps: float) -> Array:
+        """Return by how much (T, 3) hips, and ankles of flat feet, are from the source's at scale, in metres.
+
+        Args:
+            ahead: (T, 3) direction in which the body faces, in the floor plane.
+        """
+        return self.ahead * smooth(ahead, STEADY * fps) + self.rise * UP
+
     def _their_foot(self, side: str) -> Array:
         names = f"{side}_foot", f"{side}_toes"
         return self.source.at(names[1]) - self.source.at(names[0]) if self.toes else np.zeros(3)
@@ -101,12 +110,25 @@ def make_legs(source: Source, stance: Stance, turns: dict[str, Array], ahead: Ar
         toe = stance.scale * source.places(part)
         toe[:, 1] += stance.heights[side] - stance.scale * stance.their_heights[side]
         stands = source.contacts[:, 2 * number + int(stance.toes)]
-        aside = np.cross(UP, ahead) * (stance.wider * (1 - 2 * number))
-        toe += _held(smooth(aside, STEADY * source.fps), stands)
         hold = smooth_above(stands.astype(np.float64), 0.04 * source.fps)
         thigh, shin, foot = (turns[f"{side}_{each}"] for each in ("upper_leg", "lower_leg", "foot"))
+        if stance.toes:
+            toe = _swung(source, stance, side, toe, foot, hold, ahead)
+        aside = np.cross(UP, ahead) * (stance.wider * (1 - 2 * number))
+        toe += _held(smooth(aside, STEADY * source.fps), stands)
         legs.append(Leg(side, thigh, shin, foot, toe, hold))
     return legs
+
+
+def _swung(source: Source, stance: Stance, side: str, toe: Array, foot: Array, hold: Array, ahead: Array) -> Array:
+    """Return goals (T, 3) of a toe that bring the ankle where the source's is as far as the foot does not stand, over
+    the floor wherever they were."""
+    body = stance.target
+    ankle = toe - rotate(foot, body.at(f"{side}_toes") - body.at(f"{side}_foot"))
+    wanted = stance.scale * source.places(f"{side}_foot") + stance.shift(ahead, source.fps)
+    moved = toe + (1 - hold)[:, None] * (wanted - ankle)
+    moved[:, 1] = np.maximum(moved[:, 1], np.minimum(toe[:, 1], stance.heights[side]))
+    return moved
 
 
 def solve_legs(source: Source, stance: Stance, legs: list[Leg], hips: Array, pelvis: Array, ahead: Array) -> Array:

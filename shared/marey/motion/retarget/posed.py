@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping, Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,16 +32,19 @@ class PosedRig:
     def __init__(self, target: RigBody, turns: dict[str, Array], place: Array) -> None:
         self.target, self.place = target, place
         self.turns = {part: turn for part, turn in turns.items() if target.has(part)}
+        self._free = _free(target, self.turns)
+        self._posed = _with_parents(target, self._free)
 
     def spread(self) -> tuple[Array, Array]:
-        """Return turns from the upright rest pose (T, J, 4) and places (T, J, 3) of all joints; those above the hips
-        keep their rest pose."""
+        """Return turns from the upright rest pose (T, J, 4) and places (T, J, 3) of the joints that turn by themselves
+        and of all over them; those above the hips keep their rest pose. Others, such as fingers, are not set."""
         rig, parts = self.target.rig, self.target.map.parts
         frames = len(self.place)
         turned, places = np.empty((frames, len(rig), 4)), np.empty((frames, len(rig), 3))
         by_joint = {parts[part]: turn for part, turn in self.turns.items()}
         hips, rest = parts["hips"], self.target.places
-        for joint, parent in enumerate(rig.parents):
+        for joint in self._posed:
+            parent = rig.parents[joint]
             if joint in by_joint:
                 turned[:, joint] = by_joint[joint]
             else:
@@ -63,11 +68,31 @@ class PosedRig:
             away = target.places[joint] - target.places[leader]
             places[:, joint] = places[:, leader] + rotate(turned[:, leader], away)
         fixed = [joint for joint in range(len(rig)) if _over(target, joint)]
-        face = _facing(target.upright)
-        world = multiply(face, multiply(turned, multiply(target.upright, rig.orientations)))
-        places = rotate(face, places)
-        world[:, fixed], places[:, fixed] = rig.orientations[fixed], rig.positions[fixed]
-        return _local(source, target, world, places)
+        face, posed = _facing(target.upright), self._posed
+        rest = multiply(target.upright, rig.orientations[posed])
+        turned[:, posed] = multiply(face, multiply(turned[:, posed], rest))
+        places[:, posed] = rotate(face, places[:, posed])
+        turned[:, fixed], places[:, fixed] = rig.orientations[fixed], rig.positions[fixed]
+        return _local(source, target, turned, places, self._free)
+
+
+def _free(target: RigBody, turns: Mapping[str, Array]) -> list[int]:
+    """Return the joints that turn or move against their parent, parents before children."""
+    parts, joint_map = target.map.parts, target.map
+    own = {parts["hips"], *(parts[part] for part in turns), *joint_map.twists, *joint_map.follows}
+    own |= {joint for joint, parent in enumerate(target.rig.parents) if parent in joint_map.twists}
+    own |= {joint for joint in range(len(target.rig)) if _over(target, joint)}
+    return sorted(own)
+
+
+def _with_parents(target: RigBody, joints: Iterable[int]) -> list[int]:
+    """Return joints with all that they hang on, parents before children."""
+    found: set[int] = set()
+    for joint in joints:
+        while joint >= 0 and joint not in found:
+            found.add(joint)
+            joint = target.rig.parents[joint]
+    return sorted(found)
 
 
 def _over(target: RigBody, joint: int) -> bool:
@@ -80,20 +105,30 @@ def _over(target: RigBody, joint: int) -> bool:
     return True
 
 
-def _local(source: Source, target: RigBody, world: Array, places: Array) -> RiggedMotion:
+def _local(source: Source, target: RigBody, world: Array, places: Array, joints: list[int]) -> RiggedMotion:
     rig = target.rig
-    rotations, translations, moving = local_poses(rig, world, places)
+    rotations, translations, moving = local_poses(rig, world, places, joints)
     about = {"name": rig.name, "sha256": rig.sha256, "family": target.map.family}
     manifest = {**source.manifest, "rig": about}
     hips = target.map.parts["hips"]
     return RiggedMotion(rig, rotations, translations, moving, source.contacts, source.fps, hips, manifest)
 
 
-def local_poses(rig: Rig, world: Array, places: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+def local_poses(
+    rig: Rig, world: Array, places: Array, joints: Sequence[int] | None = None
+) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Return local rotations (T, J, 4), translations (T, J, 3) and which joints move (J,), see `RiggedMotion`, of
-    orientations (T, J, 4) and places (T, J, 3) in the world."""
-    rotations, translations = world.copy(), places.copy()
-    inner = [joint for joint, parent in enumerate(rig.parents) if parent >= 0]
+    orientations (T, J, 4) and places (T, J, 3) in the world.
+
+    Args:
+        joints: those that turn or move against their parent; of all others, orientations and places are not read and
+            the rest pose stays. None = all joints.
+    """
+    own = list(range(len(rig)) if joints is None else joints)
+    rotations = np.tile(rig.local_rotations, (len(world), 1, 1))
+    translations = np.tile(rig.offsets, (len(world), 1, 1))
+    roots, inner = [j for j in own if rig.parents[j] < 0], [j for j in own if rig.parents[j] >= 0]
+    rotations[:, roots], translations[:, roots] = world[:, roots], places[:, roots]
     over = [rig.parents[joint] for joint in inner]
     back = conjugate(world[:, over])
     rotations[:, inner] = multiply(back, world[:, inner])

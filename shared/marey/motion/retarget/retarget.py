@@ -14,7 +14,7 @@ from marey.core.errors import InvalidInput
 from marey.motion.filters import smooth
 from marey.motion.retarget.align import Alignment
 from marey.motion.retarget.arms import reach_hands
-from marey.motion.retarget.legs import STEADY, UP, Stance, flatten_toes, make_legs, solve_legs
+from marey.motion.retarget.legs import UP, Stance, flatten_toes, make_legs, solve_legs
 from marey.motion.retarget.posed import PosedRig
 from marey.motion.retarget.source import Source
 from marey.motion.retarget.spine import blend, shares, spans
@@ -82,8 +82,7 @@ def _ahead(source: Source) -> Array:
 def _hips(source: Source, stance: Stance, ahead: Array) -> Array:
     """Return the goal (T, 3) of the middle between the target's hip joints, metres."""
     middle = (source.places("left_upper_leg") + source.places("right_upper_leg")) / 2
-    shift = stance.ahead * smooth(ahead, STEADY * source.fps)
-    return stance.scale * middle + shift + stance.rise * UP
+    return stance.scale * middle + stance.shift(ahead, source.fps)
 
 
 def _part_turns(source: Source, alignment: Alignment) -> dict[str, Array]:
