@@ -10,6 +10,7 @@ from marey.text.blows_met import with_blows_met
 from marey.text.dropped_seats import with_seats_taken
 from marey.text.lost_footing import with_falls
 from marey.text.misleading_ways import with_exits, with_stairs_down, with_turns_between, with_ways_ahead
+from marey.text.named_blows import with_blows_named
 from marey.text.punched_air import with_pumped_fists
 from marey.text.turned_ways import with_turns_told
 from marey.vocabulary.bearing_words import stated_bearings
@@ -174,6 +175,12 @@ _HURDLE = re.compile(
     re.IGNORECASE | re.VERBOSE,
 )
 """A jump that is named by what it clears: "hurdle jump"."""
+_CLEARS = re.compile(
+    r"""\b(?P<jump>(?:jump|leap|hop|hopp)(?:s|ing)?)(?=\ (?:an?|the|his|her|some|two|three)\ (?:[\w-]+\ )?
+    (?:fence|wall|hurdle|gate|ditch|puddle|stream|brook|creek|gap|barrier|log|obstacle|hedge|railing|chasm|trench|pit)s?\b)""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""A jump of which the object is what it clears: "jumps the fence"."""
 _ROLLS_OVER = re.compile(
     r"""(?<!barrel[ ])(?<!forward[ ])(?<!shoulder[ ])(?<!log[ ])
     \b(?:(?P<s>rolls|turns)|(?P<ing>rolling|turning)|roll|turn)(?:[ ]\w+ly)?(?:[ ](?:over|back|around))?
@@ -298,7 +305,7 @@ def without_misleading(prompt: str) -> str:
     Who goes up the stairs and "back down" turns around at their end, and who hauls himself up a rope climbs it. A
     dancer who leaps does so from one foot to the other.
     """
-    prompt = with_turns_told(with_blows_met(prompt))
+    prompt = with_turns_told(with_blows_named(with_blows_met(prompt)))
     prompt = with_stairs_down(prompt)
     prompt = _DANCER_LEAPS.sub(_performs_a_leap, with_falls(with_seats_taken(prompt)))
     prompt = _DOER.sub(_as_person, _AT_WHEEL.sub(r"\g<drives>", prompt))
@@ -317,6 +324,7 @@ def without_misleading(prompt: str) -> str:
     text = _HIT_AND_STUMBLES.sub(r"\g<hit> hard", _SHOT.sub("gets hit", text))
     text = _ROLLS_FROM_THERE.sub(_rolls_onto, text)
     text = _ROLLS_OVER.sub(_lies, text)
+    text = _CLEARS.sub(r"\g<jump> over", text)
     text = _SHIFTS.sub(r"\g<shifts>", _HURDLE.sub(_jumps_over, _KNEE.sub(_knee_strike, text)))
     return _HIT_LIMB.sub(r"\g<hit>\g<how>", _STUMBLES_BACK.sub(r"\g<verb>\g<how> backward", text))
 

@@ -19,6 +19,8 @@ from marey.items.prompts import check_prompt
 from marey.text.action_reader import action_reader
 from marey.text.actions import split_actions
 from marey.text.asides import without_asides
+from marey.text.beside_postures import with_posture_first
+from marey.text.by_context import with_words_by_context
 from marey.text.clause_normalization import join_in_order
 from marey.text.elided_words import with_elided
 from marey.text.encoded_texts import EncodedTexts
@@ -64,7 +66,11 @@ TOGETHER = 64
 def _in_known_words(prompt: str) -> str:
     """Return a prompt as the readers know it: in the order of time, with the words that it leaves out, without those
     that mislead them, and with plain words of ways that wind and of gaits in place."""
-    said = with_known_verbs(with_plain_phrases(with_plain_stunts(without_asides(as_words(prompt)))))
+    said = with_known_verbs(
+        with_plain_phrases(
+            with_plain_stunts(with_posture_first(with_words_by_context(without_asides(as_words(prompt)))))
+        )
+    )
     ordered = with_hand_again(with_elided(in_time_order(in_usual_order(said))))
     return without_misleading(with_plain_gait_in_place(with_plain_zigzag(ordered)))
 

@@ -5,8 +5,22 @@ from __future__ import annotations
 import re
 from typing import NamedTuple
 
-KINDS = ("hook", "haymaker", "uppercut", "jab", "cross")
-"""Kinds of punches."""
+KINDS = {
+    "hook": r"hook",
+    "haymaker": r"haymaker",
+    "uppercut": r"uppercut",
+    "jab": r"jab",
+    "cross": r"cross",
+    "overhand": r"over[- ]?hand",
+    "backfist": r"back[- ]?fist|back[- ]?hand(?:ed)? (?:punch|strike|blow)",
+    "hammer fist": r"hammer[- ]?fist",
+    "palm strike": r"palm(?:[- ]heel)?[- ](?:strike|blow)",
+    "straight": r"straight",
+}
+"""Patterns of the kinds of punches, in the singular."""
+_SIDED = r"(?= (?:left|right)(?: hand)?(?:$|[,.;]| (?:and|then|to|at)\b))"
+_ONLY_BEFORE = {"overhand": r"(?= (?:left|right|punch|blow)|[,.;]|$)", "straight": _SIDED}
+"""Words behind one that is no punch elsewhere: "throws overhand", "walks straight"."""
 NUMBERS = {"a": 1, "an": 1, "one": 1, "two": 2, "double": 2, "couple of": 2, "three": 3, "triple": 3, "four": 4}
 """Words of numbers of punches."""
 _NUMBER = rf"(?P<number>\d|{'|'.join(NUMBERS)})"
@@ -14,7 +28,7 @@ _HEAVY = r"heavy|hard|strong|powerful|big|huge|mighty|massive|brutal|devastating
 _LIGHT = r"light|quick|rapid|fast|sharp|snappy|short|tight|soft"
 _HASTE = rf"(?:(?:{_HEAVY}|{_LIGHT}|more|slow|clean|solid|final|single|straight|lead|rear|long|boxing|body),? )*"
 """Words between a number, a side and the kind of a punch."""
-_KIND = rf"(?:{'|'.join(KINDS)})"
+_KIND = rf"(?:{'|'.join(pattern + _ONLY_BEFORE.get(kind, '') for kind, pattern in KINDS.items())})"
 _HAND = r"(?:(?:with|using|off) (?:(?:his|her|their|the|a) )?)"
 _BLOW = re.compile(
     rf"\b(?:{_NUMBER} {_HASTE})?(?:(?P<side>left|right)(?:[ -]hand(?:ed)?)? {_HASTE})?(?:{_HASTE})"
@@ -34,7 +48,7 @@ class StatedBlow(NamedTuple):
     """A punch that a prompt names.
 
     Attributes:
-        kind: one of `KINDS`; empty = only a side is named.
+        kind: a key of `KINDS`; empty = only a side is named.
         side: left or right; empty = none is named.
         weight: heavy or light; empty = neither is said.
     """
@@ -60,12 +74,17 @@ def stated_blows(prompt: str) -> list[StatedBlow]:
         if match is not kinds[-1] or len(matches) == 1:  # behind the last one they are times of the whole list
             often = _value(match["by"] or match["times"]) or (2 if match["twice"] else often)
         weight = _weight(text if len(matches) == 1 else match[0])
-        found += [StatedBlow(match["kind"], match["side"] or match["after"] or "", weight)] * often
+        found += [StatedBlow(_kind(match["kind"]), match["side"] or match["after"] or "", weight)] * often
     if kinds and len(found) > 1:
         last = kinds[-1]
         again = _value(last["by"] or last["times"]) or (2 if last["twice"] else 1)
         return found * (again if len(matches) > 1 else 1)
     return found if kinds or len(found) > 2 else []
+
+
+def _kind(word: str) -> str:
+    """Return the kind of punches that a word of one names."""
+    return next(kind for kind, pattern in KINDS.items() if re.match(pattern, word))
 
 
 def _weight(words: str) -> str:

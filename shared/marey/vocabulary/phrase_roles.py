@@ -34,6 +34,11 @@ _PATHS = frozenset(["arc", "curve", "circle"])
 _HOW = frozenset(["with", "in", "by", "between", "at", "on", "along", "around"])
 _UNDER = frozenset(["under", "against"])
 _STRUCK = frozenset(["him", "her", "them", "in", "at"])
+_BLOWS = frozenset(["kick", "punch"])
+_KINDS_OF_BLOWS = frozenset(["spin", "turn", "turn-around", "jump", "jump-turn", "push"])
+"""Actions that say what kind of blow it is before its noun."""
+_KIND_WORDS = 2
+"""Words between such a word and the noun: "360 degree spin kick"."""
 _DEFINITE = frozenset(["the", "his", "her", "their", "its"])
 
 
@@ -132,6 +137,7 @@ class PhraseRoles:
             or self._is_averted(words, match)
             or self._modifies_person(words, match)
             or self._says_how(words, found, at)
+            or self._is_kind_of_blow(words, found, at)
             or self._is_by_others(words, match)
             or self._is_likened(words, found, at)
             or self._is_held(words, match)
@@ -229,6 +235,22 @@ class PhraseRoles:
             return False  # "walks along a curve"
         before = self._before_noun(words, match.start)
         return before >= 0 and words[before].text in _HOW
+
+    def _is_kind_of_blow(self, words: list[Word], found: Sequence[Match], at: int) -> bool:
+        """Return True for a movement that is part of the blow behind it: "a spinning back kick", "360 degree kick"."""
+        match = found[at]
+        if at + 1 == len(found):
+            return False
+        verb, after = words[match.start], found[at + 1]
+        is_form = verb.text == verb.base or verb.text.endswith("ing")  # "spins" is a verb of its own
+        kinds = all(each.action in _KINDS_OF_BLOWS or each.action is None for each in match.meanings)
+        is_blow = any(each.noun and each.action in _BLOWS for each in after.meanings)
+        between = words[match.end : after.start]
+        lists = self._lists
+        apart = len(between) > _KIND_WORDS or any(
+            word.text in STOPS or word.text in lists.breaks or word.text in lists.determiners for word in between
+        )
+        return is_form and kinds and is_blow and not apart
 
     def _is_by_others(self, words: list[Word], match: Match) -> bool:
         """Return True if another person does it in a clause of time: "while someone explains the plan"."""

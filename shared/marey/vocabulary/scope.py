@@ -39,6 +39,14 @@ which may ask for a movement ("walks in, then hoists the sail")."""
 VERSION = 1
 STANDING = "idle"
 """Action of a body that only makes a gesture; said beside other actions, too: "stands and waves"."""
+GESTURES = frozenset(
+    {
+        *("wave", "raise-arm", "clap", "cheer", "laugh", "nod", "signal", "guide", "shiver", "talk", "drink", "wash"),
+        *("reach-up", "reach-forward", "aim", "shoot", "draw-bow", "cast-spell", "throw", "slash", "stab", "block"),
+        *("bow", "twist", "arm-circles", "flinch", "punch"),
+    }
+)
+"""Actions of arms, head and trunk: they are done in the posture in which the body is."""
 MAX_TEXT = 200
 """Characters of a prompt that stand for the action of one that names none."""
 KEPT_READINGS = 1024

@@ -165,3 +165,31 @@ def test_what_is_left_out_leaves_the_actions_to_be_seen() -> None:
 
 def shows(features: np.ndarray, action: str) -> bool:
     return RULES[action](Motion(LAYOUT.decode(features), FPS), "") >= SHOWN
+
+
+@pytest.mark.parametrize(
+    ("action", "said"),
+    [("climb-onto", "vaults over the wall"), ("jump-forward", "jumps over a log"), ("flip", "does a front flip")],
+)
+@pytest.mark.parametrize("seed", [1, 2])
+def test_who_lands_rolls_on_from_there(action: str, said: str, seed: int) -> None:
+    before, after = drawn(action, said, seed), drawn("roll", "rolls", seed)
+    joined = flowing_as_shown(before, after, LAYOUT, (action, "roll"), landing=True)
+    stopped = flowing_as_shown(before, after, LAYOUT, (action, "roll"))
+    assert joined is not None
+    assert stopped is not None
+
+    def highest_between(before: np.ndarray, after: np.ndarray) -> float:
+        joints = joints_of(before, after)
+        feet = joints[: len(before), [7, 8, 10, 11], 1].min(axis=1)
+        lands = int(np.flatnonzero(feet > 0.12)[-1]) + 3
+        return float(joints[lands : lands + int((joints[lands:, 0, 1] < 0.55).argmax()), 0, 1].max())
+
+    assert highest_between(joined.before, joined.after) < 0.9
+    assert highest_between(stopped.before, stopped.after) > 0.9, "without it the body stands up first"
+    for rule, features in ((action, joined.before), ("roll", joined.after)):
+        assert RULES[rule](Motion(LAYOUT.decode(features), FPS), "") >= SHOWN
+    whole = joints_of(joined.before, joined.after)
+    middle = slice(len(joined.before) - 4, len(joined.before) + 14)
+    assert fastest(whole[middle]) < max(fastest(joints_of(before)), fastest(joints_of(after)))
+    assert whole[:, [7, 8, 10, 11], 1].min() > -0.04

@@ -15,12 +15,15 @@ from marey.generation.shots.going_on import (
     aside_of,
     is_way,
     keeps_course,
+    passes_over,
+    rolls_landing,
     without_halt,
     without_wait,
 )
 from marey.generation.shots.windows import no_text
 from marey.motion.features import HUMANML3D_263
 from marey.text.features import TextFeatures
+from marey.vocabulary.entries import load_vocabulary
 from tests.support.bodies import Body, steady
 
 LAYOUT = HUMANML3D_263
@@ -92,3 +95,20 @@ def test_ways_behind_other_movements_keep_their_course() -> None:
     assert keeps_course(duck, text("walks away", walk))
     assert not keeps_course(duck, text("walks in a circle", walk))
     assert not keeps_course(text("walks", walk), text("walks away", walk)), "they are joined as one way"
+
+
+def said(words: str, prompt: str = "") -> TextFeatures:
+    return replace(no_text(4), rewritten=words, prompt=prompt or words)
+
+
+def test_vaults_and_steps_over_things_go_on() -> None:
+    assert passes_over(said("a person clambers over, vaults over the wall"))
+    assert passes_over(said("a person stands upright, breathing calmly, arms hanging at the sides", "steps over a log"))
+    assert not passes_over(said("a person bows"))
+
+
+def test_who_lands_rolls_and_does_not_fall_or_kick() -> None:
+    flip = said(load_vocabulary().need("flip").plain_words)
+    assert rolls_landing(flip, said(load_vocabulary().need("roll").plain_words))
+    assert not rolls_landing(flip, said("a person kicks"))
+    assert not rolls_landing(said("a person bows"), said(load_vocabulary().need("roll").plain_words))

@@ -62,6 +62,10 @@ def test_every_bearing_that_moves_is_drawn() -> None:
         "vacuums the rug",
         "pulls the gate open",
         "shoves the heavy door open",
+        "steps over a puddle",
+        "steps over the cable",
+        "steps over a low wall",
+        "steps over two logs",
     ],
 )
 @pytest.mark.parametrize("seed", SEEDS)
@@ -340,3 +344,73 @@ def test_a_side_gallop_leaves_the_floor_in_each_step_to_its_side(side: str, sign
 
 def _cosine(a: np.ndarray, b: np.ndarray) -> float:
     return float(a @ b / np.linalg.norm(a) / np.linalg.norm(b))
+
+
+@pytest.mark.parametrize(
+    ("prompt", "least", "most"),
+    [("steps over a puddle", 0.2, 0.32), ("steps over a log", 0.4, 0.52), ("steps over a low wall", 0.58, 0.72)],
+)
+@pytest.mark.parametrize("seed", SEEDS)
+def test_both_feet_go_over_what_is_stepped_over(prompt: str, least: float, most: float, seed: int) -> None:
+    joints = drawn(prompt, seed=seed)
+    assert ((joints[:, ANKLES, 1].max(axis=0) > least - 0.12) & (joints[:, ANKLES, 1].max(axis=0) < most)).all()
+    standing = joints[:, ANKLES, 1].min(axis=1) < 0.2
+    assert standing.all(), "one foot is always on the floor"
+    strides = np.abs(joints[:, 7, 2] - joints[:, 8, 2]).max()
+    assert strides > (0.8 if "puddle" in prompt else 0.45)
+    assert joints[-1, PELVIS, 2] - joints[0, PELVIS, 2] > 1.0
+
+
+def test_it_steps_over_as_many_things_as_are_named() -> None:
+    def lifts(prompt: str) -> int:
+        high = drawn(prompt)[:, 7, 1] > 0.3
+        return int(np.count_nonzero(high[1:] & ~high[:-1]))
+
+    assert lifts("steps over a log") == 1
+    assert lifts("steps over three logs") == 3
+    assert lifts("steps over several obstacles") == 2
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_an_elbow_strikes_with_a_folded_arm(side: str, seed: int) -> None:
+    joints = drawn(f"throws a {side} elbow to the jaw", seed=seed)
+    shoulder, elbow, wrist = (joints[:, one + (side == "right")] for one in (16, 18, 20))
+    hit = elbow[:, 2].argmax()
+    assert np.linalg.norm(wrist - shoulder, axis=-1)[hit - 3 : hit + 3].max() < 0.36
+    assert elbow[hit, 1] > shoulder[hit, 1] - 0.08, "the upper arm is level"
+    assert np.linalg.norm(np.diff(elbow, axis=0), axis=-1).max() * FPS > 2.0
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_headbutt_draws_back_and_snaps_the_head_forward(seed: int) -> None:
+    joints = drawn("headbutts his opponent", seed=seed)
+    ahead = joints[:, HEAD, 2] - joints[:, PELVIS, 2]
+    assert ahead.max() > 0.3
+    assert ahead[: ahead.argmax()].min() < ahead[0] - 0.03
+    assert np.diff(ahead).max() * FPS > 1.5
+
+
+@pytest.mark.parametrize(("prompt", "way"), [("slaps him with the right hand", 1), ("backhands him", -1)])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_slap_goes_across_a_face(prompt: str, way: int, seed: int) -> None:
+    joints = drawn(prompt, seed=seed)
+    hand = joints[:, WRISTS] - joints[:, [NECK]]
+    speed = np.linalg.norm(np.diff(hand, axis=0), axis=-1) * FPS
+    passes, acts = np.unravel_index(int(speed.argmax()), speed.shape)
+    across, ahead = hand[:, acts, 0] * (1 if acts else -1), hand[:, acts, 2]
+    assert speed.max() > 3.0
+    assert ahead[passes - 3 : passes + 4].max() > 0.3
+    assert way * (across[passes + 2] - across[passes - 2]) > 0.15
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_spun_backfist_strikes_out_of_a_whole_turn(seed: int) -> None:
+    joints = drawn("a spinning backfist", seed=seed)
+    across = joints[:, 1] - joints[:, 2]
+    turned = np.degrees(np.unwrap(np.arctan2(-across[:, 2], across[:, 0])))
+    assert 350 < abs(turned[-1] - turned[0]) < 370
+    reach = np.linalg.norm(joints[:, WRISTS] - joints[:, SHOULDERS], axis=-1).max(axis=1)
+    round_again = np.abs(turned - turned[0]) > 250
+    assert reach[round_again].max() > 0.42
+    assert np.ptp(joints[round_again][:, TOES, 1].min(axis=1)) < 0.05

@@ -83,8 +83,29 @@ def test_a_hook_swings_across_and_an_uppercut_comes_from_below() -> None:
     assert uppercut[:, 1].max() > 0.05
 
 
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_blows_go_ways_of_their_own(side: str) -> None:
+    outward = -1.0 if side == "right" else 1.0
+
+    def way(kind: str) -> np.ndarray:
+        return hands(drawn("punch", f"a {side} {kind}", side=side))[:, int(side == "right")] * [outward, 1.0, 1.0]
+
+    overhand, hammer, backfist, haymaker, hook = map(way, ("overhand", "hammer fist", "backfist", "haymaker", "hook"))
+    assert overhand[: overhand[:, 2].argmax(), 1].max() > 0.22, "over the shoulder, then down"
+    assert hammer[: hammer[:, 2].argmax(), 1].max() > 0.32, "from over the head"
+    assert hammer[hammer[:, 2].argmax() :, 1].min() < 0.0
+    first = int(backfist[:, 0].argmin())
+    assert backfist[first, 0] < -0.05, "from the other shoulder"
+    assert backfist[first:, 0].max() > backfist[first, 0] + 0.25
+    assert haymaker[:, 0].max() > hook[:, 0].max() + 0.04, "wider than a hook"
+
+
 @pytest.mark.parametrize(
-    "prompt", ["{} uppercut", "uppercut, {}, heavy", "quick {} uppercut", "{} hook", "{} hand jab"]
+    "prompt",
+    [
+        *("{} uppercut", "uppercut, {}, heavy", "quick {} uppercut", "{} hook", "{} hand jab", "an overhand {}"),
+        *("a wild {} haymaker", "{} backfist", "a {} hammer fist", "{} palm strike", "a straight {}"),
+    ],
 )
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_the_referee_passes_blows_of_either_hand(prompt: str, side: str) -> None:

@@ -277,3 +277,25 @@ def test_the_steps_of_a_way_back_or_aside_are_no_walk(sentence: str, actions: li
     steps = wanted_of([sentence])
     assert steps is not None
     assert [each.action for step in steps for each in step] == actions
+
+
+def kneeling_bower() -> Array:
+    """A body on its knees that bows: its hips are low and stay where they are."""
+    joints = bower().copy()
+    joints[..., 1] -= 0.42
+    return joints
+
+
+def test_who_kneels_or_sits_bows_too() -> None:
+    assert matched(kneeling_bower(), "a person bows") >= SHOWN
+    sinking = kneeling_bower()
+    sinking[..., 1] += np.interp(np.arange(len(sinking)), [0, 10], [0.42, 0.0])[:, None]
+    assert matched(sinking, "a person bows") < SHOWN, "who goes down meanwhile does not"
+
+
+def test_an_aim_and_the_shot_behind_it_are_part_of_the_draw_of_a_bow() -> None:
+    told = wanted_of(("a person draws a bow", "a person aims", "a person shoots an arrow"))
+    assert told == wanted_of(("a person draws a bow",))
+    again = wanted_of(("a person draws a bow", "a person waves", "a person draws a bow"))
+    assert again is not None
+    assert len(again) == 3

@@ -49,6 +49,19 @@ OBJECTS: list[Row] = [
     ("whirls the whole body around", ["spin"]),
     ("spins on one foot", ["spin"]),
 ]
+BLOWS: list[Row] = [
+    ("a 360 degree spin kick", ["kick"]),
+    ("a spinning back kick", ["kick"]),
+    ("performs a spinning roundhouse kick", ["kick"]),
+    ("a jumping spin kick", ["kick"]),
+    ("throws a backfist", ["punch"]),
+    ("throws an overhand right", ["punch"]),
+    ("lands a right cross", ["punch"]),
+    # movements of their own
+    ("spins and kicks", ["spin", "kick"]),
+    ("she jumps, then does a kick", ["jump", "kick"]),
+    ("throws the ball overhand", ["throw"]),
+]
 PARTICLES: list[Row] = [
     ("walks down the lane", ["walk"]),
     ("walking up and down", ["walk"]),
@@ -122,7 +135,7 @@ CONTEXT: list[Row] = [
 ]
 
 
-@pytest.mark.parametrize(("prompt", "actions"), [*PARTS, *OBJECTS, *PARTICLES, *PERFORMED, *NOUNS, *CONTEXT])
+@pytest.mark.parametrize(("prompt", "actions"), [*PARTS, *OBJECTS, *BLOWS, *PARTICLES, *PERFORMED, *NOUNS, *CONTEXT])
 def test_a_prompt_is_read_as_what_the_person_does(prompt: str, actions: list[str | None]) -> None:
     assert read(prompt) == actions
 

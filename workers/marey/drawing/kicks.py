@@ -7,15 +7,11 @@ import math
 import random
 from dataclasses import replace
 
-import numpy as np
-
 from marey.drawing.gesture import SIDES, Gesture
 from marey.drawing.postures import STAND, FootPlace, HandPlace, Point, Posture
 from marey.drawing.sequels import Sequel, both, near
-from marey.motion.rotations import from_rotvec, rotate
-from marey.posing.curves import monotone
-from marey.posing.limbs import FPS, LEVEL
-from marey.posing.standing import LEFT, LEGS, OTHER_SIDE, RIGHT, SIGN, StandingBody
+from marey.drawing.stances import turn_about_foot
+from marey.posing.standing import LEFT, OTHER_SIDE, RIGHT, SIGN, StandingBody
 
 _LEG = 0.785
 """Metres from hip to ankle of a leg that is almost straight."""
@@ -68,11 +64,7 @@ def spin_kick(rng: random.Random, side: str = "") -> Gesture:
 
     def change(body: StandingBody) -> None:
         gesture.change(body)
-        joints = body.joints
-        turned = monotone(np.array(times), np.array(degrees)[:, None], np.arange(len(joints)) / FPS)
-        pivot = joints[:, LEGS[OTHER_SIDE[side]][-1]].mean(0) * LEVEL
-        about = np.array([0.0, 1.0, 0.0]) * np.radians(SIGN[side] * turned)
-        joints[:] = pivot + rotate(from_rotvec(about)[:, None], joints - pivot)
+        turn_about_foot(body, OTHER_SIDE[side], times, [SIGN[side] * each for each in degrees])
 
     return replace(gesture, change=change)
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from marey.motion.rotations import from_rotvec, normalize, rotate
 from marey.motion.skeleton import HUMANML3D
 from marey.posing.curves import blurred, monotone
-from marey.posing.limbs import FPS
+from marey.posing.limbs import FPS, LEVEL
 from marey.posing.standing import LEFT, LEGS, StandingBody, eased
 
 Array = NDArray[np.floating]
@@ -67,6 +67,22 @@ def step(
 def turn_hips(body: StandingBody, degrees: Array) -> None:
     """Turn the hips and all above them to the left by `degrees` (T,); the feet stay."""
     body.turn(0, "up", degrees, besides=(1, 2))
+
+
+def turn_about_foot(body: StandingBody, side: str, times: Sequence[float], degrees: Sequence[float]) -> None:
+    """Turn a whole body about the toes of one foot, which stays where it is.
+
+    Args:
+        body: whose other foot is in the air meanwhile.
+        side: of the foot.
+        times: seconds, increasing.
+        degrees: by which the body has turned to the left then.
+    """
+    joints = body.joints
+    turned = glide(len(joints), times, [[each] for each in degrees])
+    pivot = joints[min(round(times[0] * FPS), len(joints) - 1), LEGS[side][-1]] * LEVEL
+    about = np.array([0.0, 1.0, 0.0]) * np.radians(turned)
+    joints[:] = pivot + rotate(from_rotvec(about)[:, None], joints - pivot)
 
 
 def settle(body: StandingBody) -> None:

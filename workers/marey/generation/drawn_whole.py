@@ -26,6 +26,7 @@ from marey.generation.fine_wish import FineWish
 from marey.generation.stated import stated_features
 from marey.generation.striking import stands
 from marey.generation.timed import worded_seed
+from marey.generation.weight import WEIGHS, with_weight
 from marey.generation.whole_body import CHOICES, QUICKER, is_drawn, retimed
 from marey.motion.features import FeatureLayout, encode_all
 from marey.posing.limbs import FPS
@@ -154,6 +155,8 @@ def _shown(action: str, wish: FineWish, rng: random.Random, frames: int | None) 
         if number == DRAWN:
             break
         joints = _drawn(gesture, wish.fixed, frames, rng)
+        if action in WEIGHS:
+            joints = with_weight(joints, random.Random(f"{gesture.seconds} weight"))  # noqa: S311
         side = wish.side if gesture.side in (LEFT, RIGHT) else ""
         if RULES[action](Motion(joints, FPS), side) >= SHOWN:
             return gesture, joints

@@ -14,6 +14,7 @@ from collections.abc import Callable, Mapping
 from marey.drawing.bat_swings import bat_swing
 from marey.drawing.bounces import toe_bounces
 from marey.drawing.burpees import burpees
+from marey.drawing.close_blows import headbutt, slap, spun_backfist
 from marey.drawing.dives import cover_dive, ground_slide, side_dive
 from marey.drawing.doors import pulled_door, pushed_door
 from marey.drawing.errands import cower, curtsy, rowing, shelf_lift, shoe_tied
@@ -27,11 +28,13 @@ from marey.drawing.moonwalks import moonwalk
 from marey.drawing.peeks import catch, peek
 from marey.drawing.pitches import pitch
 from marey.drawing.planks import plank
+from marey.drawing.punches import elbow_strike
 from marey.drawing.rides import bicycle_ride, horse_ride
 from marey.drawing.sidesteps import sidestep
 from marey.drawing.slips import slip_caught
 from marey.drawing.sports import bowling, fencing_lunge, jump_shot, tennis_serve
 from marey.drawing.staggers import stagger
+from marey.drawing.step_overs import FLAT, LOG, WALL, WIDE, step_over
 from marey.drawing.stumbles import stumble
 from marey.drawing.vacuuming import vacuuming
 from marey.generation.dancing import named_dance
@@ -47,6 +50,8 @@ from marey.vocabulary.in_place import goes_in_place
 
 MOST = 8
 """Times that a movement is done at most."""
+MOST_OVER = 4
+"""Things that a body steps over at most."""
 BURPEE_S = 3.6
 """Seconds of one of several burpees."""
 LUNGE_S = 1.9
@@ -62,6 +67,17 @@ _EXERCISE = re.compile(r"\W*lunges\W*")
 _REAR_LEG = re.compile(r"\b(left|right) (?:leg|foot|knee) (?:back|behind)\b")
 _TO_CHEST = re.compile(r"\b(?:chest|chin|belly|stomach|high)\b")
 _PULLS = re.compile(r"^(?:pull|draw|hug)")
+_OBSTACLES = {
+    WIDE: re.compile(
+        r"\b(?:puddles?|gaps?|ditch\w*|trench\w*|streams?|brooks?|creeks?|holes?|pits?|water|mud|ice|snow)\b"
+    ),
+    WALL: re.compile(r"\b(?:walls?|fences?|hurdles?|barriers?|barricades?|rail(?:ing)?s?|box\w*|crates?|bench\w*)\b"),
+    FLAT: re.compile(
+        r"\b(?:cracks?|gutters?|ropes?|cables?|cords?|hoses?|lines?|thresholds?|sills?|kerbs?|curbs?|planks?|toys?"
+        r"|chain|(?:trip)?wires?)\b"
+    ),
+}
+"""Words of what is stepped over; anything else is as high as a log."""
 _STEPS = frozenset({"step", "steps", "paces"})
 _BACK = re.compile(r"\bback(?:wards?)?\b")
 _SLIPS = re.compile(r"\bslip|\bfooting\b")
@@ -153,6 +169,34 @@ def _knee_strike(stated: StatedBearing, wish: FineWish, rng: random.Random, seco
     del wish, seconds
     letter = _SIDE_LETTER.search(stated.words)
     return knee_strike(rng, _SIDES[letter[1]] if letter else stated.side, _times(stated))
+
+
+def _elbow_strike(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del wish, seconds
+    return elbow_strike(rng, stated.side, _times(stated) or 1)
+
+
+def _headbutt(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del wish, seconds
+    return headbutt(rng, _times(stated) or 1)
+
+
+def _slap(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del seconds
+    back = re.search(r"\bback[- ]?hand", stated.words) is not None
+    return slap(rng, stated.side or wish.side, _times(stated) or 1, back=back)
+
+
+def _spun_backfist(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del wish, seconds
+    return spun_backfist(rng, stated.side)
+
+
+def _step_over(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del wish, seconds
+    what = next((what for what, words in _OBSTACLES.items() if words.search(stated.words)), LOG)
+    several = 2 if re.search(r"\b(?:some|several|the|few|many)? ?(?:obstacles|things)\b", stated.words) else 1
+    return step_over(rng, what, stated.side, min(_times(stated) or several, MOST_OVER))
 
 
 def _moonwalk(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
@@ -317,6 +361,11 @@ NAMED: Mapping[str, Callable[[StatedBearing, FineWish, random.Random, float | No
     "lunges": _lunges,
     "knee-raise": _knee_raise,
     "knee-strike": _knee_strike,
+    "elbow-strike": _elbow_strike,
+    "headbutt": _headbutt,
+    "slap": _slap,
+    "backfist-spun": _spun_backfist,
+    "step-over": _step_over,
     "moonwalk": _moonwalk,
     "stumble": _stumble,
     "side-gallop": _side_gallop,

@@ -52,7 +52,7 @@ from marey.posing.standing import LEFT, RIGHT
 from marey.vocabulary.bearing_words import stated_bearings
 from marey.vocabulary.counts import stated_number
 from marey.vocabulary.peeks import only_peeks
-from marey.vocabulary.scope import STANDING
+from marey.vocabulary.scope import GESTURES, STANDING
 
 Row = tuple[str, str]
 """The id of the action of a row, empty if there is none that is known, and its words in lower case."""
@@ -73,14 +73,6 @@ THERE = frozenset({"sit", "lie", ""})
 RISING = frozenset({"get-up", "stand-up"})
 RISES_FROM: Mapping[str, frozenset[str]] = {"get-up": LYING, "stand-up": SEATED}
 """Postures from which these rise by their definitions."""
-GESTURES = frozenset(
-    {
-        *("wave", "raise-arm", "clap", "cheer", "laugh", "nod", "signal", "guide", "shiver", "talk", "drink", "wash"),
-        *("reach-up", "reach-forward", "aim", "shoot", "draw-bow", "cast-spell", "throw", "slash", "stab", "block"),
-        *("bow", "twist", "arm-circles", "flinch", "punch"),
-    }
-)
-"""Actions of arms, head and trunk: they are done in the posture in which the body is."""
 AIMS = frozenset({"aim", "shoot"})
 """Actions that are done on the front, on the elbows."""
 LAIN = frozenset(

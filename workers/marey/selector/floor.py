@@ -54,9 +54,9 @@ def bow(m: Motion, side: str) -> float:
     head = m.joints[:, HEAD, 1]
     drop = float(np.percentile(head, 95) - head[low])
     still = most(m.path, 0.2 * m.seconds + 0.5, 0.3)
-    hands = least(float(_hands_off(m)[low]), 0.4, 0.1)
-    stands = least(float(m.hips[low]), 0.75, 0.05)
-    return min(least(bent, 15, 5), least(drop, 0.05, 0.02), least(back, 0.4, 0.2), still, hands, stands)
+    stands = min(least(float(_hands_off(m)[low]), 0.4, 0.1), least(float(m.hips[low]), 0.75, 0.05))
+    rests = min(most(float(np.ptp(m.hips)), 0.1, 0.03), most(rest, 35, 10))  # of a body that kneels or sits meanwhile
+    return min(least(bent, 15, 5), least(drop, 0.05, 0.02), least(back, 0.4, 0.2), still, max(stands, rests))
 
 
 def bend_over(m: Motion, side: str) -> float:

@@ -12,7 +12,9 @@ from marey.selector.motion import Array, Bool, Motion
 
 
 def _stands(m: Motion) -> float:
-    return least(float(np.median(m.hips)), 0.8, 0.06)
+    """Grade that the body stands, or kneels or sits where it is."""
+    rests = most(float(np.ptp(m.hips)), 0.1, 0.03)
+    return max(least(float(np.median(m.hips)), 0.8, 0.06), rests)
 
 
 def laugh(m: Motion, side: str) -> float:

@@ -80,8 +80,11 @@ Step = tuple[WantedAction, ...]
 """Actions of one stretch of time."""
 ONCE = frozenset({"die", "lie", "lie-down", "get-up"})
 """Actions that cannot be done again where they end: "he slips and falls" is one fall."""
-PARTS: Mapping[str, frozenset[str]] = {"jump-turn": frozenset({"turn", "turn-around", "spin"})}
-"""Actions that are part of one: "jumps and turns around"."""
+PARTS: Mapping[str, frozenset[str]] = {
+    "jump-turn": frozenset({"turn", "turn-around", "spin"}),
+    "draw-bow": frozenset({"aim"}),
+}
+"""Actions that are part of one: "jumps and turns around", "draws the bow, aims and shoots an arrow"."""
 
 
 def wanted_of(sentences: Iterable[str]) -> tuple[Step, ...] | None:
@@ -94,13 +97,19 @@ def wanted_of(sentences: Iterable[str]) -> tuple[Step, ...] | None:
     Returns:
         One step a sentence, none for a sentence that names only what is not done; None if a sentence names no action,
         or one that has no rule. Sentences behind each other that name one action of `ONCE` are one step, and so is an
-        action with its `PARTS` behind it.
+        action with its `PARTS` behind it, and what is told of it behind these.
     """
     steps = [step for step in map(_step, sentences) if step != ()]
     found = tuple(step for step in steps if step is not None)
     if not found or len(found) < len(steps):
         return None
-    return tuple(step for before, step in zip(((), *found), found, strict=False) if not _is_told(before, step))
+    kept, partly = list[Step](), False
+    for step in found:
+        told = bool(kept) and (_is_told(kept[-1], step) or (partly and step == kept[-1]))
+        partly = told and step != kept[-1]
+        if not told:
+            kept.append(step)
+    return tuple(kept)
 
 
 def _is_told(before: Step, step: Step) -> bool:

@@ -68,6 +68,9 @@ GOES_M, GOING, SPEED_S = 0.5, 0.8, 0.1
 deviation of the filter of its speed, seconds."""
 FALLS_M, DOWN_M = 0.35, 0.27
 """Metres by which a body that falls or rolls goes down, and by which it is down when it goes on out of a way."""
+FLIES_M, LANDS_IN, LANDS_M = 0.12, 6, 0.38
+"""Metres of the lowest joint of the feet over the floor from which on a body flies, frames in which it lands, and
+metres by which a body that goes on down then is down already."""
 WIDE = 110.0
 """Degrees by which an arm turns on that way that passes before the body."""
 HEAD = 15
@@ -98,6 +101,7 @@ def flowing(
     entered: int = 0,
     down: bool = False,
     onward: bool = False,
+    landing: bool = False,
 ) -> JoinedRows | None:
     """Return two drawn movements that go on into each other; None if a body does not stand between them.
 
@@ -109,8 +113,11 @@ def flowing(
         entered: frames at the beginning of the first in which it goes on from another one.
         down: the body goes to the floor, or bends on, in the second out of the bent posture of the first.
         onward: the first is a way, out of whose speed the second goes on.
+        landing: the first ends on the feet out of the air or off the hands, and the second, in which the body goes
+            down, begins there.
     """
     first, second = (layout.decode(each).astype(np.float64) for each in (before, after))
+    onward = onward or landing
     if not ((onward or _stands(first[-1])) and _stands(second[0])) or min(len(first), len(second)) < LEAST:
         return None
     if len(first) - entered < LEAST // 2:
@@ -119,7 +126,8 @@ def flowing(
     if down:
         ends, begins = (_bent(first), _lowered(second)) if _falls(second) else (_bowed(first), _bending(second))
     if onward:
-        ends, begins = _under_way(first), _lowered(second, DOWN_M)[-NEAR:] if _falls(second) else begins
+        ends = _landed(first) if landing else _under_way(first)
+        begins = _lowered(second, LANDS_M if landing else DOWN_M)[-NEAR:] if _falls(second) else begins
         if not len(ends):
             return None
     apart = _apart(_at_feet(first)[ends], _at_feet(second)[begins])
@@ -134,11 +142,12 @@ def flowing(
     if onward:
         count = min(count, ONWARD) if _falls(second) else count
         second = second + _ahead(first, second, end, begin, count)
-    way = _way(first, second, end, begin, count, onward=onward)
+    goes_on = (1, NEAR) if landing else (count, count)
+    way = _way(first, second, (end, begin), count, goes_on, onward=onward)
     joints = np.concatenate([first[:end], way, second[begin + 1 :]])
     features = encode_all(layout, joints)
     border = end
-    if onward and _falls(second):
+    if onward and _falls(second) and not landing:
         border = max(end - LEAD, LEAST // 2)
     elif down and not _falls(second):  # who is hit is bent by it
         border = end + count
@@ -153,17 +162,22 @@ def flowing_as_shown(
     *,
     whole: tuple[bool, bool] = (False, False),
     entered: int = 0,
+    landing: bool = False,
 ) -> JoinedRows | None:
     """Return two drawn movements that go on into each other as `flowing` does, and still show their actions: of one
     that would not, nothing is left out. None if they cannot.
 
     Args:
         before, after, layout, whole, entered: as of `flowing`.
+        landing: as of `flowing`, if both show then.
         actions: their ids in the vocabulary; empty = none that is known.
     """
     first, second = whole
-    for tried in dict.fromkeys([(first, second), (first, True), (True, second), (True, True)]):
-        joined = flowing(before, after, layout, whole=tried, entered=entered)
+    ways = dict.fromkeys([(first, second), (first, True), (True, second), (True, True)])
+    for lands, tried in [*([(True, (first, second))] if landing else []), *((False, way) for way in ways)]:
+        joined = flowing(before, after, layout, whole=tried, entered=entered, landing=lands)
+        if joined is None and lands:
+            continue
         if joined is None:
             return None
         rows = ((before, joined.before, actions[0]), (after, joined.after, actions[1]))
@@ -267,6 +281,17 @@ def _under_way(joints: Array) -> NDArray[np.intp]:
     return np.arange(max(last - STRIDE, LEAST // 2), max(last, LEAST // 2 + 1))
 
 
+def _landed(joints: Array) -> NDArray[np.intp]:
+    """Return the first frames in which a body is on its feet again out of the air or off the hands; none where it never
+    was."""
+    low = joints[:, [joint for leg in LEGS.values() for joint in leg[2:]], 1].min(axis=1)
+    up = np.flatnonzero(low > FLIES_M)
+    if not len(up):
+        return np.zeros(0, np.intp)
+    lands = int(up[-1]) + 1
+    return np.arange(lands, min(lands + LANDS_IN, len(joints) - 1))
+
+
 def _velocity(joints: Array) -> Array:
     """Return the velocity (T, 3) of the pelvis over the floor, metres a second."""
     return smooth(np.gradient(joints[:, 0] * LEVEL, axis=0) * FPS, SPEED_S * FPS)
@@ -318,11 +343,15 @@ def _beside(pose: Array, joints: Array, frame: int) -> Array:
     return rotate(about("Y", np.radians(degrees)), joints - here) + there
 
 
-def _way(first: Array, second: Array, end: int, begin: int, count: int, *, onward: bool) -> Array:
-    """Return so many joints (count, 22, 3) of the way from frame `end` of one movement to frame `begin` of another:
-    both go on meanwhile, and the second stands where it goes on; `onward`: from one speed to the other."""
-    leaves = first[np.minimum(end + np.arange(count), len(first) - 1)]
-    comes = second[np.maximum(begin + 1 + np.arange(count) - count, 0)]
+def _way(
+    first: Array, second: Array, borders: tuple[int, int], count: int, goes_on: tuple[int, int], *, onward: bool
+) -> Array:
+    """Return so many joints (count, 22, 3) of the way from frame `end` of one movement to frame `begin` of another, its
+    `borders`: both go on meanwhile, for so many frames as `goes_on` says, and the second stands where it goes on;
+    `onward`: from one speed to the other."""
+    end, begin = borders
+    leaves = first[np.minimum(end + np.minimum(np.arange(count), goes_on[0] - 1), len(first) - 1)]
+    comes = second[np.maximum(begin + 1 + np.maximum(np.arange(count) - count, -goes_on[1]), 0)]
     share = np.arange(1, count + 1) / (count + 1)
     way = (1 - eased(share))[:, None, None] * leaves + eased(share)[:, None, None] * comes
     if onward:

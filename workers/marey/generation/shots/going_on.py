@@ -18,6 +18,7 @@ from marey.motion.features import FeatureLayout
 from marey.motion.rotations import Array
 from marey.selector.matching import WAYS, wanted_of
 from marey.text.features import TextFeatures
+from marey.vocabulary.bearing_words import stated_bearings
 from marey.vocabulary.courses import ASIDE, QUARTER, STRAIGHT, stated_course
 from marey.vocabulary.gazes import without_gaze
 from marey.vocabulary.in_place import goes_in_place
@@ -26,6 +27,11 @@ Float32 = NDArray[np.float32]
 
 GOES_ON = WAYS | {"leap"}
 """Actions of a body that may go on from them into the next one: who leaps runs up and on."""
+PASSES, PASSES_OVER = frozenset({"climb-onto"}), frozenset({"step-over"})
+"""Actions, and names of movements, that are drawn as a way over something: a vault, and a step."""
+LANDS = PASSES | {"leap", "jump", "jump-forward", "jump-turn", "flip", "cartwheel"}
+ROLLING = frozenset({"roll"})
+"""Drawn actions that end on the feet out of the air, or off the hands, and those that go on out of such a landing."""
 FALLING, THROWING = frozenset({"die", "roll"}), frozenset({"throw"})
 """Actions that go on out of the speed of a way, and of a run."""
 GOING = 0.7
@@ -42,6 +48,16 @@ def is_way(text: TextFeatures) -> bool:
         return False
     steps = wanted_of(text.actions or (text.rewritten,)) or ()
     return len(steps) == 1 and {each.action for each in steps[0]} <= GOES_ON
+
+
+def passes_over(text: TextFeatures) -> bool:
+    """Return True if a drawn movement is a way over something, which goes on into the next way."""
+    return action_of(text) in PASSES or any(each.name in PASSES_OVER for each in stated_bearings(text.said))
+
+
+def rolls_landing(before: TextFeatures, after: TextFeatures) -> bool:
+    """Return True if a drawn roll goes on out of the landing of the drawn movement before it."""
+    return action_of(before) in LANDS and action_of(after) in ROLLING
 
 
 def is_onward(before: TextFeatures, after: TextFeatures) -> bool:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from marey.generation.port import Limits, Request
-from marey.generation.shots.going_on import is_way
+from marey.generation.shots.going_on import is_way, passes_over
 from marey.generation.shots.headings import heading_change
 from marey.generation.shots.levels import lifted
 from marey.generation.shots.timeline_plan import TimelinePart, even_parts
@@ -100,6 +100,11 @@ class RowStrand(Strand):
         waits = not moves and (action_of(self.text) in ("", STANDING) or any(each.bearing.gesture for each in stated))
         is_low = self.held.is_drawn and bool(self.held.begin)  # it has no rest before it goes down
         return self.is_drawn and not (waits or is_low)
+
+    @property
+    def goes_on(self) -> bool:
+        """True if it is a way, or is drawn as one over something: none of them halts before the next."""
+        return is_way(self.text) or (self.is_drawn and passes_over(self.text))
 
     def as_way(self, layout: FeatureLayout) -> WayRow:
         """Return what the row is for the lengths of ways."""

@@ -33,6 +33,7 @@ from marey.generation.shots.going_on import (
     is_onward,
     is_way,
     keeps_course,
+    rolls_landing,
     without_halt,
     without_wait,
 )
@@ -167,12 +168,7 @@ class _Timeline:
         if first.open and first.features is not None and is_way(first.text) and not first.is_drawn:
             first.features = without_wait(first.features, layout)
         for before, after in pairwise(self.rows):
-            if (
-                before.features is not None
-                and after.features is not None
-                and is_way(before.text)
-                and is_way(after.text)
-            ):
+            if before.features is not None and after.features is not None and before.goes_on and after.goes_on:
                 before.features, after.features = without_halt(before.features, after.features, layout)
         for row in self.rows:
             if row.features is not None and not row.open and is_way(row.text):
@@ -236,7 +232,10 @@ class _Timeline:
                 if down:
                     joined = flowing(*pair, layout, whole=whole, entered=before.entered, down=True)
                 else:
-                    joined = flowing_as_shown(*pair, layout, actions, whole=whole, entered=before.entered)
+                    landing = before.is_trimmed and rolls_landing(before.text, after.text)
+                    joined = flowing_as_shown(
+                        *pair, layout, actions, whole=whole, entered=before.entered, landing=landing
+                    )
                 if joined is not None:
                     after.changes = {**after.changes, **({"posture": AS_BEFORE} if down else {})}
                     before.changes = {**before.changes, **({"posture": BENT_ON} if struck else {})}
