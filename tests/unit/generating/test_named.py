@@ -352,7 +352,7 @@ def _cosine(a: np.ndarray, b: np.ndarray) -> float:
 )
 @pytest.mark.parametrize("seed", SEEDS)
 def test_both_feet_go_over_what_is_stepped_over(prompt: str, least: float, most: float, seed: int) -> None:
-    joints = drawn(prompt, seed=seed)
+    joints = named_movement(prompt, seed=seed)
     assert ((joints[:, ANKLES, 1].max(axis=0) > least - 0.12) & (joints[:, ANKLES, 1].max(axis=0) < most)).all()
     standing = joints[:, ANKLES, 1].min(axis=1) < 0.2
     assert standing.all(), "one foot is always on the floor"
@@ -363,7 +363,7 @@ def test_both_feet_go_over_what_is_stepped_over(prompt: str, least: float, most:
 
 def test_it_steps_over_as_many_things_as_are_named() -> None:
     def lifts(prompt: str) -> int:
-        high = drawn(prompt)[:, 7, 1] > 0.3
+        high = named_movement(prompt)[:, 7, 1] > 0.3
         return int(np.count_nonzero(high[1:] & ~high[:-1]))
 
     assert lifts("steps over a log") == 1
@@ -374,7 +374,7 @@ def test_it_steps_over_as_many_things_as_are_named() -> None:
 @pytest.mark.parametrize("side", ["left", "right"])
 @pytest.mark.parametrize("seed", SEEDS)
 def test_an_elbow_strikes_with_a_folded_arm(side: str, seed: int) -> None:
-    joints = drawn(f"throws a {side} elbow to the jaw", seed=seed)
+    joints = named_movement(f"throws a {side} elbow to the jaw", seed=seed)
     shoulder, elbow, wrist = (joints[:, one + (side == "right")] for one in (16, 18, 20))
     hit = elbow[:, 2].argmax()
     assert np.linalg.norm(wrist - shoulder, axis=-1)[hit - 3 : hit + 3].max() < 0.36
@@ -384,7 +384,7 @@ def test_an_elbow_strikes_with_a_folded_arm(side: str, seed: int) -> None:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_headbutt_draws_back_and_snaps_the_head_forward(seed: int) -> None:
-    joints = drawn("headbutts his opponent", seed=seed)
+    joints = named_movement("headbutts his opponent", seed=seed)
     ahead = joints[:, HEAD, 2] - joints[:, PELVIS, 2]
     assert ahead.max() > 0.3
     assert ahead[: ahead.argmax()].min() < ahead[0] - 0.03
@@ -394,7 +394,7 @@ def test_a_headbutt_draws_back_and_snaps_the_head_forward(seed: int) -> None:
 @pytest.mark.parametrize(("prompt", "way"), [("slaps him with the right hand", 1), ("backhands him", -1)])
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_slap_goes_across_a_face(prompt: str, way: int, seed: int) -> None:
-    joints = drawn(prompt, seed=seed)
+    joints = named_movement(prompt, seed=seed)
     hand = joints[:, WRISTS] - joints[:, [NECK]]
     speed = np.linalg.norm(np.diff(hand, axis=0), axis=-1) * FPS
     passes, acts = np.unravel_index(int(speed.argmax()), speed.shape)
@@ -406,7 +406,7 @@ def test_a_slap_goes_across_a_face(prompt: str, way: int, seed: int) -> None:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_spun_backfist_strikes_out_of_a_whole_turn(seed: int) -> None:
-    joints = drawn("a spinning backfist", seed=seed)
+    joints = named_movement("a spinning backfist", seed=seed)
     across = joints[:, 1] - joints[:, 2]
     turned = np.degrees(np.unwrap(np.arctan2(-across[:, 2], across[:, 0])))
     assert 350 < abs(turned[-1] - turned[0]) < 370
