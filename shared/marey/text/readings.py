@@ -44,13 +44,14 @@ from marey.vocabulary.bearings import FEET
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.gazes import only_gaze, stated_gaze, without_gaze
 from marey.vocabulary.lengths import is_length, stated_length
-from marey.vocabulary.scope import STANDING
+from marey.vocabulary.scope import STANDING, every_action, match_scope
 from marey.vocabulary.who_acts import says_more
 
 SURELY, SURELY_AGREED = 0.9, 0.4
 """Probabilities from which on there is no doubt about an action, and about the only one that the words name."""
-UNSPLIT = 0.2
-"""Probability from which on a prompt that is no sequence asks for one action."""
+UNSPLIT, GUESSED = 0.35, 0.2
+"""Probabilities from which on a prompt that is no sequence asks for one action, and does so if its words name no other
+one and nothing but a body acts."""
 ATTACK = "stab"
 """Action that "lunges" is read as."""
 WHOLE = SERIES | frozenset(BOUND_TO_HANDS)
@@ -95,6 +96,13 @@ class ReadPrompt:
 def _stops_and_looks(prompt: str) -> bool:
     """Return True if a prompt asks for a stop and nothing else but that the head turns: "he stops and looks back"."""
     return bool(stated_gaze(prompt)) and _STOPS.fullmatch(without_gaze(prompt)) is not None
+
+
+def likeliest(bare: BarePrompt, read: ReadAction) -> str | None:
+    """Return the action that a prompt of one action is likeliest to ask for; None = several, none, or in doubt."""
+    said = match_scope(bare.prompt, every_action())
+    named = {each.action for each in said.actions} - {None}
+    return read.likely(UNSPLIT if "other-subject" in said.flags or not named <= {read.name} else GUESSED)
 
 
 def _is_list_of(first: ReadMovement) -> bool:
@@ -268,7 +276,7 @@ class TrainedReaders:
             each_side = tuple(side for each in movements for side in self._by_sides(each.text) or (each,))
             return ReadPrompt.of(bare.prompt, movements[0].action) if one else ReadPrompt(bare.prompt, each_side)
         surely = read.probability >= (SURELY_AGREED if read.least == AGREED else SURELY)
-        return ReadPrompt.of(bare.prompt, read.likely(UNSPLIT) if self._movements else read.action, surely=surely)
+        return ReadPrompt.of(bare.prompt, likeliest(bare, read) if self._movements else read.action, surely=surely)
 
     def _by_sides(self, prompt: str) -> tuple[ReadMovement, ...]:
         """Return the movements of a prompt that asks for one action on one side and then on the other, and perhaps for
