@@ -11,8 +11,8 @@ import random
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.checks.kinematics import smooth
 from marey.drawing.stances import glide
+from marey.motion.filters import smooth
 from marey.posing.limbs import FPS
 from marey.posing.standing import ARMS, LEFT, LEGS, StandingBody, eased
 
@@ -69,7 +69,7 @@ def _hands(body: StandingBody) -> tuple[Array, Array]:
     joints = body.joints
     wrists = joints[:, [arm[3] for arm in ARMS.values()]].mean(axis=1)
     seen = body.local(wrists - joints[:, 0], LEFT)
-    moved = smooth(seen - seen[0], FILTER_S, FPS)
+    moved = smooth(seen - seen[0], FILTER_S * FPS)
     return moved[:, 0], np.maximum(moved[:, 2], 0.0)
 
 
