@@ -134,7 +134,8 @@ def _without_aim(found: re.Match[str]) -> str:
 
 
 def _without_title(text: str) -> str:
-    """Return a text without the words before a colon that only name what comes: "Comedy bit:", "I need a loop:"."""
+    """Return a text without the words before a colon that only name what comes: "Comedy bit:", "I need a loop:"; nor
+    those of an event before a comma."""
     event = _EVENT.match(text)
     if (
         event is not None

@@ -10,6 +10,7 @@ import re
 
 from marey.text.action_reader import named_actions
 from marey.vocabulary.bearing_words import stated_bearings
+from marey.vocabulary.inflection import indefinite_article
 from marey.vocabulary.scope import GESTURES
 
 _WHERE = r"(?: (?:on|in|at|down|upon|behind|against|cross-legged)(?: (?!and\b|then\b)[\w'-]+){0,4}?)?"
@@ -82,5 +83,5 @@ def _rises(found: re.Match[str]) -> bool:
 
 
 def _article(noun: str, like: str) -> str:
-    article = "an" if noun[0].lower() in "aeiou" else "a"
+    article = indefinite_article(noun)
     return article.capitalize() if like[0].isupper() else article

@@ -14,6 +14,7 @@ from dataclasses import replace
 
 from marey.text.clauses import DOING, LIMBS, LISTS, SIDES, SUBJECTS, Clause
 from marey.text.words import inflected, is_past, lemma
+from marey.vocabulary.inflection import indefinite_article
 
 DEFAULT_SUBJECT = "a person"
 
@@ -62,7 +63,7 @@ def _with_subject(clause: Clause, said: str) -> str:
     if noun:
         return f"{DEFAULT_SUBJECT} {DOING[noun]} {small}"
     if first in _PEOPLE:
-        return f"{'an' if first[0] in 'aeiou' else 'a'} {small}"
+        return f"{indefinite_article(first)} {small}"
     if first in SUBJECTS or _subject_later(clause):
         return said
     doing = first.endswith("ing") or (second.endswith("ing") and (first.endswith("ly") or first in {"just", "still"}))

@@ -78,11 +78,10 @@ _STOPS = re.compile(
 """The same of one that comes to rest: "walk stop", "run to idle"."""
 _THEN = ", then "
 _COUNTED_AND_MORE = re.compile(
-    rf"""\b(?P<verb>[a-z]+)(?P<number>\ {_NUMBER})(?P<how>(?:\ (?!(?:and|then|more)\b)[a-z-]+){{0,2}}?)
+    rf"""\b(?P<verb>[a-z]+)\ {_NUMBER}(?:\ (?!(?:and|then|more)\b)[a-z-]+){{0,2}}?
     \ (?P<noun>(?!(?:times|seconds|minutes|met(?:er|re)s|feet|yards|degrees)\b)[a-z-]+s)\b
-    (?P<between>[^.;]*?(?:,|\band|\bthen)\ )
-    (?:(?P<again>tak|do|mak|throw|perform|land|execut)(?:e?s|es|ing|e)?\ )?
-    (?P<more>(?:another\ )?(?:{_NUMBER}|one|a\ few)(?:\ more)?)
+    [^.;]*?(?:,|\band|\bthen)(?:\ (?P<again>tak|do|mak|throw|perform|land|execut)(?:e?s|es|ing|e)?)?
+    \ (?P<more>(?:another\ )?(?:{_NUMBER}|a\ few)(?:\ more)?)
     (?=\W*$|[,.;]|\ (?:and|then|to|back|forwards?|backwards?|left|right|in|with|on)\b)""",
     re.IGNORECASE | re.VERBOSE,
 )

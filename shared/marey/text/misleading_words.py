@@ -14,7 +14,7 @@ from marey.text.named_blows import with_blows_named
 from marey.text.punched_air import with_pumped_fists
 from marey.text.turned_ways import with_turns_told
 from marey.vocabulary.bearing_words import stated_bearings
-from marey.vocabulary.inflection import in_form_of
+from marey.vocabulary.inflection import in_form_of, indefinite_article
 from marey.vocabulary.scope import STANDING
 
 _STRUCK = re.compile(
@@ -415,8 +415,7 @@ def _kneels(found: re.Match[str]) -> str:
 
 def _jumps_over(found: re.Match[str]) -> str:
     """Return a jump over the thing that its name says."""
-    article = "an" if found["thing"][0].lower() in "aeiou" else "a"
-    return f"{found['jump']} forward over {article} {found['thing']}"
+    return f"{found['jump']} forward over {indefinite_article(found['thing'])} {found['thing']}"
 
 
 def _knee_strike(found: re.Match[str]) -> str:

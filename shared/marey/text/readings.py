@@ -100,9 +100,12 @@ def _stops_and_looks(prompt: str) -> bool:
 
 def likeliest(bare: BarePrompt, read: ReadAction) -> str | None:
     """Return the action that a prompt of one action is likeliest to ask for; None = several, none, or in doubt."""
+    guess = read.likely(GUESSED)
+    if guess is None or read.probability >= UNSPLIT:
+        return guess
     said = match_scope(bare.prompt, every_action())
     named = {each.action for each in said.actions} - {None}
-    return read.likely(UNSPLIT if "other-subject" in said.flags or not named <= {read.name} else GUESSED)
+    return None if "other-subject" in said.flags or not named <= {guess} else guess
 
 
 def _is_list_of(first: ReadMovement) -> bool:

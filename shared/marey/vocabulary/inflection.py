@@ -167,6 +167,11 @@ def _stems(base: str) -> set[str]:
     return {base}
 
 
+def indefinite_article(word: str) -> str:
+    """Return "a" or "an" for a word, by its first letter."""
+    return "an" if word[0].lower() in "aeiou" else "a"
+
+
 def in_form_of(said: str, verb: str) -> str:
     """Return a verb in the form of another one, or of its ending: in -ing, in the third person, or as it is."""
     end = said.lower()

@@ -16,6 +16,7 @@ from marey.generation.handler import GeneratorHandler
 from marey.generation.shots.editor import EditModel
 from marey.jobs import asset_key, get_job, list_items
 from marey.jobs.states import ItemState
+from marey.jobs.types import MotionRow
 from marey.motion import MotionClip, edit
 from marey.motion.clip import parse_npz
 from marey.registry import get_model, model_names
@@ -52,21 +53,13 @@ def test_a_stream_shows_frames_obeys_and_becomes_a_motion(
         prompts = stream_prompts(conn, stream)
     turned = next(frame.number for frame in frames if frame.prompt == 1)
     assert prompts == [(0, "a person walks"), (turned, "a person waves")]
+    motion = motion_of(studio, streaming, engine, folder_store, stream)
     assert row.job is not None
-    handler = GeneratorHandler(streaming.model, lambda *_, **__: generator, 4, Settings())
-    loop = Loop(engine, folder_store, handler)
-    try:
-        loop.run()
-    finally:
-        loop.close()
     with transaction(engine) as conn:
-        (item,) = list_items(conn, studio.key.tenant, row.job).rows
         assert get_job(conn, studio.key.tenant, row.job).state == "succeeded"
-    assert item.state is ItemState.SUCCEEDED
-    assert item.motion is not None
-    assert item.motion.frames == len(frames)
-    assert item.motion.metadata["stream"] == str(stream)
-    assert item.motion.metadata["prompts"] == [[0, "a person walks"], [turned, "a person waves"]]
+    assert motion.frames == len(frames)
+    assert motion.metadata["stream"] == str(stream)
+    assert motion.metadata["prompts"] == [[0, "a person walks"], [turned, "a person waves"]]
 
 
 def pose() -> dict[str, Any]:
@@ -74,8 +67,8 @@ def pose() -> dict[str, Any]:
     return {"joint_rotations": dancer(3, 8)[0][4].tolist(), "root_height": 0.85}
 
 
-def clip_of(studio: Studio, streaming: Streaming, engine: sa.Engine, store: FolderStore, stream: UUID) -> MotionClip:
-    """The stored motion of an ended stream."""
+def motion_of(studio: Studio, streaming: Streaming, engine: sa.Engine, store: FolderStore, stream: UUID) -> MotionRow:
+    """The record of the motion of an ended stream, once a worker has made it."""
     generator, row = load(streaming.bundle), studio.row(stream)
     assert row.job is not None
     loop = Loop(engine, store, GeneratorHandler(streaming.model, lambda *_, **__: generator, 4, Settings()))
@@ -87,7 +80,13 @@ def clip_of(studio: Studio, streaming: Streaming, engine: sa.Engine, store: Fold
         (item,) = list_items(conn, studio.key.tenant, row.job).rows
     assert item.state is ItemState.SUCCEEDED, item.problem
     assert item.motion is not None
-    file = next(each for each in item.motion.files if each.format == "npz")
+    return item.motion
+
+
+def clip_of(studio: Studio, streaming: Streaming, engine: sa.Engine, store: FolderStore, stream: UUID) -> MotionClip:
+    """The stored motion of an ended stream."""
+    motion = motion_of(studio, streaming, engine, store, stream)
+    file = next(each for each in motion.files if each.format == "npz")
     return parse_npz(store.get(asset_key(studio.key.tenant, file.sha256)))
 
 
