@@ -11,9 +11,10 @@ import pytest
 from marey.bundles.manifest import BundleManifest
 from marey.generation.export import finish
 from marey.generation.port import Request
-from marey.generation.shots.asked_frames import JOIN, asks_more, frames_alone, frames_between, joined, ways
+from marey.generation.shots.asked_frames import JOIN, STEPS, asks_more, frames_alone, frames_between, joined, ways
 from marey.generation.shots.edit_levels import LevelledFrames
 from marey.generation.shots.editor import EditModel
+from marey.generation.shots.lifted_steps import STOOD
 from marey.generation.shots.windows import CROSSFADE
 from marey.models.hgm3.generate import Generator
 from marey.motion import MotionClip, edit
@@ -179,7 +180,7 @@ def test_a_movement_is_not_cut_by_the_way_to_it(drawing: Generator, monkeypatch:
     rest = ways(beside[0], LevelledFrames(alone(drawing, prompt, 80)), beside[1], drawing.layout, 4)[1]
     assert rest > JOIN
     shorter = alone(drawing, prompt, 80 - (rest - JOIN))
-    kept = slice(60 + JOIN + CROSSFADE, 60 + 80 - rest - CROSSFADE)
+    kept = slice(60 + STEPS + STOOD, 60 + 80 - rest - CROSSFADE)
     np.testing.assert_allclose(made.features[kept], shorter[kept.start - 60 : kept.stop - 60], atol=1e-6)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from marey.generation.shots.lifted_steps import with_steps
+from marey.generation.shots.lifted_steps import between_stances, with_steps
 from marey.motion.features import HUMANML3D_263
 from marey.posing.bones import two_bones
 from marey.posing.standing import LEFT, LEGS, RIGHT, eased
@@ -57,3 +57,49 @@ def test_a_foot_that_steps_by_itself_or_hardly_moves_stays() -> None:
 def test_a_foot_that_slides_elsewhere_than_in_a_transition_stays() -> None:
     features = pushed(0.3)
     assert with_steps(features, LAYOUT, [(45, 53)]) is features
+
+
+CUT = 25
+"""Frame at which one stance is cut to another one."""
+
+
+def stance(wide: float, frames: int) -> np.ndarray:
+    """Return features (T, D) of a body that stands with its feet so many metres farther apart than at ease."""
+    joints = Body(frames / LAYOUT.fps).joints()[:frames]
+    for side, away in ((LEFT, wide / 2), (RIGHT, -wide / 2)):
+        hip, knee, ankle, toe = LEGS[side]
+        joints[:, [ankle, toe], 0] += away
+        joints[:, knee], _ = two_bones(
+            joints[:, hip], joints[:, ankle], np.tile([0.0, 0.0, 1.0], (len(joints), 1)), (LENGTH[knee], LENGTH[ankle])
+        )
+    return LAYOUT.encode(joints)
+
+
+def ankles_apart(features: np.ndarray) -> np.ndarray:
+    ankles = LAYOUT.decode(features)[:, [LEGS[side][2] for side in (LEFT, RIGHT)]]
+    return np.linalg.norm(ankles[:, 0] - ankles[:, 1], axis=-1)
+
+
+@pytest.mark.parametrize("span", [(CUT, CUT + 12), (CUT - 12, CUT)], ids=["into it", "out of it"])
+def test_a_body_steps_from_one_stance_to_the_next(span: tuple[int, int]) -> None:
+    cut = np.concatenate([stance(0.0, 40)[:CUT], stance(0.3, 60)[: 60 - CUT]])
+    share = np.clip((np.arange(len(cut)) - CUT + 8) / 16, 0, 1)[:, None].astype(np.float32)
+    pushed = (1 - share) * cut[:1] + share * cut[-1:]
+    stepped = between_stances(pushed, LAYOUT, cut, [span])
+    before, after = ankles_apart(cut)[[0, -1]]
+    assert ankles_apart(stepped)[: span[0]] == pytest.approx(before, abs=0.01)
+    assert ankles_apart(stepped)[span[1] :] == pytest.approx(after, abs=0.01)
+    toes = LAYOUT.decode(stepped)[:, [LEGS[side][3] for side in (LEFT, RIGHT)]]
+    lifted = np.ptp(toes[..., 1], axis=0)
+    assert lifted == pytest.approx(0.07, abs=0.015)
+    contacts = LAYOUT.contacts(stepped)
+    assert not contacts[span[0] : span[1]].all(axis=0).any()
+    assert contacts[: span[0]].all()
+    assert contacts[span[1] :].all()
+
+
+def test_a_stance_that_is_left_or_reached_on_the_move_stays() -> None:
+    walks = LAYOUT.encode(walker(3.0))
+    stands = stance(0.3, 60)
+    for cut in (np.concatenate([walks[:CUT], stands[CUT:]]), np.concatenate([stands[:CUT], walks[CUT:]])):
+        assert between_stances(cut, LAYOUT, cut, [(CUT, CUT + 12)]) is cut

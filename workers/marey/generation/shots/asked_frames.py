@@ -26,13 +26,15 @@ from marey.generation.port import GenerationControl, Generator, MotionFeatures, 
 from marey.generation.shots.dispatch import generate_any, resolve_request
 from marey.generation.shots.edit_levels import LevelledFrames, levelled
 from marey.generation.shots.levels import CLIMBS, lifted
+from marey.generation.shots.lifted_steps import between_stances, with_steps
 from marey.generation.shots.provenance import KEY, describe_timeline
 from marey.generation.shots.timelines import RISE, RISE_SPEED, TimelineMotion
 from marey.generation.shots.windows import Float32, FrameGap, crossfaded, fill, most_frames, no_text
 from marey.generation.stated import STATED
 from marey.generation.timed import CUT_SHARE, TimedText, part_seed
 from marey.generation.wish import Wish
-from marey.motion.features import FeatureLayout
+from marey.motion.features import FeatureLayout, HeadingLayout
+from marey.motion.skeleton import HUMANML3D
 from marey.text.features import TextFeatures
 from marey.vocabulary.courses import STRAIGHT
 from marey.vocabulary.scope import STANDING
@@ -42,6 +44,8 @@ SHORTEST_S = 1.0
 JOIN = 4
 """Frames at an end of the new ones that are generated again, at least: a token. With 8, as in timelines, less of the
 movement is left, and jerk is as small (docs/decisions/0037-edits-by-a-model.md)."""
+STEPS = 12
+"""Frames in which a body that stands steps into the stance of the new frames, and out of it."""
 CANCELLED = "the edit was cancelled"
 SINK_SPEED = 1.0
 """Metres a second at which a body goes down to where the new frames begin, or from where they end: faster than it gets
@@ -167,7 +171,8 @@ def joined(
     """
     layout, limits, new = generator.layout, generator.limits, level.features
     raised = [lifted(before, level.before, layout), new, lifted(after, level.after, layout)]
-    whole, start, end = np.concatenate(raised), len(before), len(before) + len(new)
+    cut, start, end = np.concatenate(raised), len(before), len(before) + len(new)
+    whole = cut
     most, (first, last) = most_frames(limits, 2), ends
     found = [
         (a, b, number, floor)
@@ -190,6 +195,10 @@ def joined(
         # A window may end with frames that the others have no place for.
         made = window.features[: len(whole) - a + window.first]
         whole = crossfaded(whole, replace(window, features=lifted(made, floor, layout)), a - window.first)
+    if isinstance(layout, HeadingLayout) and layout.skeleton.name == HUMANML3D.name:
+        steps = min(STEPS, len(new) // 2)
+        whole = between_stances(whole, layout, cut, [(start, start + steps), (end - steps, end)])
+        whole = with_steps(whole, layout, [(a, b) for a, b, *_ in found])
     return whole
 
 

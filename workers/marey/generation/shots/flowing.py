@@ -359,20 +359,35 @@ def _way(
         goes, comes_at = _velocity(first)[end], _velocity(second)[begin]
         pelvis = first[end, 0] + goes * time + (comes_at - goes) * time**2 * FPS / (2 * (count - 1))
         way += ((pelvis - way[:, 0]) * LEVEL)[:, None]
-    steps = {side: float(np.linalg.norm((comes[-1, leg[2]] - leaves[0, leg[2]]) * LEVEL)) for side, leg in LEGS.items()}
-    for number, side in enumerate(sorted(steps, key=lambda each: -steps[each])):
-        _, _, ankle, toe = LEGS[side]
-        goes = steps[side] > STEPS_M
-        done = np.clip((share - (1 - SHARE) * number) / SHARE, 0.0, 1.0) if goes else share
-        stepped = eased(done)
-        lift = np.array([0.0, 1.0, 0.0]) * (LIFT_M * goes * np.sin(np.pi * done))[:, None]
-        for joint in (ankle, toe):
-            way[:, joint] = (1 - stepped[:, None]) * leaves[:, joint] + stepped[:, None] * comes[:, joint] + lift
+    for side, (feet, _) in steps_between(leaves, comes, share).items():
+        way[:, list(LEGS[side][2:])] = feet
     leaves, way, comes = (np.concatenate([leaves[:1], each, comes[-1:]]) for each in (leaves, way, comes))
     body = StandingBody(way)
     for side in ARMS:
         _pass_arm(body, leaves, comes, side)
     return body.solved()[1:-1]
+
+
+def steps_between(leaves: Array, comes: Array, share: Array) -> dict[str, tuple[Array, NDArray[np.bool_]]]:
+    """Return for each side the places (T, 2, 3) of ankle and toe on the way from one stance to the next, and the frames
+    (T,) in which the foot steps: the one with the longer way first, and a foot that stays about where it is not at all.
+
+    Args:
+        leaves, comes: joints (T, 22, 3) that the way leads from and to, metres.
+        share: (T,) of the time of the way, 0 to 1.
+    """
+    ankles = {side: leg[2] for side, leg in LEGS.items()}
+    far = {side: float(np.linalg.norm((comes[-1, at] - leaves[0, at]) * LEVEL)) for side, at in ankles.items()}
+    found: dict[str, tuple[Array, NDArray[np.bool_]]] = {}
+    for number, side in enumerate(sorted(far, key=lambda each: -far[each])):
+        goes = far[side] > STEPS_M
+        done = np.clip((share - (1 - SHARE) * number) / SHARE, 0.0, 1.0) if goes else share
+        stepped = eased(done)[:, None, None]
+        foot = list(LEGS[side][2:])
+        places = (1 - stepped) * leaves[:, foot] + stepped * comes[:, foot]
+        places[..., 1] += (LIFT_M * goes * np.sin(np.pi * done))[:, None]
+        found[side] = places, goes & (done > 0) & (done < 1)
+    return found
 
 
 def _pass_arm(body: StandingBody, leaves: Array, comes: Array, side: str) -> None:

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.generation.shots.flowing import LIFT_M
+from marey.generation.shots.flowing import LIFT_M, steps_between
 from marey.generation.shots.windows import CROSSFADE
 from marey.motion.features import HeadingLayout
 from marey.motion.feet import runs
@@ -31,8 +31,53 @@ LIFT_SHARE = 0.25
 """Share of its way by which a foot is lifted on a short one."""
 STEPS_M = 0.033
 """Metres over the floor of a foot that steps by itself, on the average of its way."""
+STOOD = CROSSFADE + 1
+"""Frames in which a body stands before it steps, and behind: there, a network has changed its feet as well."""
 PASSES_S = 0.04
 """Standard deviation of the filter of the arc, seconds."""
+
+
+def between_stances(
+    features: Float32, layout: HeadingLayout, cut: Float32, spans: Sequence[tuple[int, int]]
+) -> Float32:
+    """Return features (T, D) of a body that steps from one stance to the next, where a network would push its feet.
+
+    Args:
+        features: of the whole, in the layout's own units, on the skeleton of HumanML3D.
+        layout: of the features.
+        cut: (T, D) the movements that the whole leads from one to the next, cut to each other.
+        spans: the first frame of each way between stances, and the one after its last, with the cut at one of them.
+            Where a foot moves beside the cut, nothing is changed.
+    """
+    joints, stood = (layout.decode(each).astype(np.float64) for each in (features, cut))
+    stepped, contacts = joints.copy(), layout.contacts(features).copy()
+    for begin, end in spans:
+        if not _stands(stood, layout.fps, begin, end):
+            continue
+        share = np.clip(np.arange(1 - STOOD, end - begin + STOOD) / (end - begin + 1), 0.0, 1.0)
+        way = slice(begin - STOOD, end + STOOD - 1)
+        here, there = (joints[at : at + 1].repeat(len(share), axis=0) for at in (begin - STOOD, end + STOOD - 1))
+        steps = steps_between(here, there, share)
+        if any(goes.any() for _, goes in steps.values()):
+            for number, (side, (places, goes)) in enumerate(sorted(steps.items())):
+                stepped[way, list(LEGS[side][2:])] = places
+                contacts[way, 2 * number : 2 * number + 2] &= ~goes[:, None]
+    if np.array_equal(stepped, joints):
+        return features
+    changed = _with_legs(features, layout, joints, stepped)
+    changed[:, layout.slices["contacts"]] = contacts
+    return changed
+
+
+def _stands(cut: Array, fps: float, begin: int, end: int) -> bool:
+    """Return True if a body stands in both of two movements that are cut to each other within some frames."""
+    if begin < STOOD or end + STOOD > len(cut):
+        return False
+    toes = cut[begin - STOOD : end + STOOD, [leg[3] for leg in LEGS.values()]]
+    speeds = np.linalg.norm(np.diff(toes * LEVEL, axis=0), axis=-1).max(axis=1) * fps
+    at = [STOOD - 1, len(speeds) - STOOD]  # the cut is at one of them
+    rests = min(float(np.delete(speeds, each).max()) for each in at)
+    return rests < MOVES_M_S and float(np.ptp(toes[..., 1])) < STEPS_M
 
 
 def with_steps(features: Float32, layout: HeadingLayout, spans: Sequence[tuple[int, int]]) -> Float32:
@@ -48,9 +93,14 @@ def with_steps(features: Float32, layout: HeadingLayout, spans: Sequence[tuple[i
     for begin, end in spans:
         for side, first, last in _slides(joints, layout.fps, begin, end):
             _lift(stepped, side, first, last, layout.fps)
-    moved = stepped - joints
-    if not moved.any():
+    if np.array_equal(stepped, joints):
         return features
+    return _with_legs(features, layout, joints, stepped)
+
+
+def _with_legs(features: Float32, layout: HeadingLayout, joints: Array, stepped: Array) -> Float32:
+    """Return features of joints (T, 22, 3) whose ankles and toes are elsewhere, their knees bent accordingly."""
+    moved = stepped - joints
     ahead = facing(joints, layout.skeleton)
     for hip, knee, ankle, _ in LEGS.values():
         raised = moved[:, ankle].any(axis=1)
