@@ -46,8 +46,14 @@ class Selector:
                 return found | self._users_of(name)
             if not found and name in _names_at_import(tree):
                 return self.map.covering(mutation.path, _runtime_lines(tree))
-            # TorchScript and child processes run methods that nothing traces: tests of the class stand in.
-            return found or self._around(chain_of_nodes[1:], mutation.path)
+            # TorchScript and child processes run what nothing traces: tests of its class, of its users, or of files of
+            # a similar name stand in.
+            return (
+                found
+                or self._around(chain_of_nodes[1:], mutation.path)
+                or self._users_of(name)
+                or self._namesakes(mutation.path)
+            )
         # The line runs once, when its module is imported: tests that run what uses it stand in.
         if isinstance(chain_of_nodes[0] if chain_of_nodes else None, ast.arguments):
             return self.map.covering(mutation.path, _runtime_lines(chain_of_nodes[1]))
@@ -63,6 +69,11 @@ class Selector:
         """Tests that run lines of the inmost of these nodes that any test runs."""
         found = (self.map.covering(path, _runtime_lines(node)) for node in nodes)
         return next(filter(None, found), set())
+
+    def _namesakes(self, path: str) -> set[str]:
+        """Tests in files that share a word with the name of a file."""
+        name = Path(path).name
+        return {test for test, record in self.map.tests.items() if record.passed and _nearness(record.file, name)}
 
     def _stand_ins(self, tree: ast.Module, mutation: Mutation, around: list[ast.AST]) -> Iterator[set[str]]:
         for name in _bound_names(tree, mutation.line):

@@ -153,7 +153,12 @@ def names(*tests: str) -> set[str]:
 def test_a_line_knows_its_tests_also_those_that_reach_it_by_a_shared_fixture(root: Path, known: LineMap) -> None:
     select = Selector(root, known).select
     assert set(select(mutant(root, "return x / times").mutation)) == names("test_wide", "test_only_elsewhere")
-    assert select(mutant(root, "return x - 1").mutation) == []
+
+
+def test_a_line_that_nothing_traces_gets_the_tests_of_files_of_a_similar_name(root: Path, known: LineMap) -> None:
+    passed = {name for name, test in known.tests.items() if test.passed}
+    assert set(Selector(root, known).select(mutant(root, "return x - 1").mutation)) == passed
+    assert names("test_broken").isdisjoint(passed)
 
 
 def test_a_line_that_runs_on_import_gets_the_tests_of_its_users(root: Path, known: LineMap) -> None:
