@@ -6,7 +6,6 @@ import contextlib
 import json
 from collections.abc import AsyncIterator, Sequence
 from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +45,7 @@ from marey.api.texts.routes import router as texts_router
 from marey.api.webhooks.routes import router as webhooks_router
 from marey.core.addresses import Allowed
 from marey.core.errors import InvalidInput
+from marey.core.package import own_version
 from marey.core.settings import Settings, settings
 from marey.db import check_listening, create_engine
 from marey.http import problems
@@ -73,7 +73,7 @@ def create_app(config: Settings, routers: Sequence[APIRouter] = ROUTERS) -> Fast
     """Create the application with these routers; connects to nothing before it starts."""
     app = FastAPI(
         title="Marey",
-        version=version("marey"),
+        version=own_version(),
         description=DESCRIPTION,
         lifespan=lambda app: _lifespan(app, config),
         generate_unique_id_function=_operation_id,

@@ -36,6 +36,7 @@ from marey.cli.operations import OperationsCommand
 from marey.core import tracing
 from marey.core.errors import InvalidInput, MareyError
 from marey.core.garbage import end_without_collection
+from marey.core.package import own_version
 from marey.core.validation import problem_of
 
 SERVING = frozenset({"serve", "worker", "scheduler", "api", "probe", "text", "train", "data"})
@@ -137,9 +138,7 @@ app = typer.Typer(
 
 def _version(wanted: bool) -> None:
     if wanted:
-        from importlib.metadata import version
-
-        console.result(version("marey"))
+        console.result(own_version())
         raise typer.Exit(0)
 
 

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 import re
-import secrets
 import stat
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
@@ -15,6 +13,7 @@ from typing import Any
 
 from marey.client.csv_cells import join_tags, restore, write_csv
 from marey.core.errors import Conflict, InvalidInput
+from marey.core.whole_files import whole_file
 from marey.exporters import extension_of
 from marey.items.timeline import timeline_text
 
@@ -213,13 +212,8 @@ def _read(path: Path) -> list[Row]:
 
 
 def _replace(path: Path, content: bytes) -> None:
-    part = path.with_name(f".{path.name.lstrip('.')}.{secrets.token_hex(4)}.part")
     try:
-        with part.open("xb") as stream:
-            stream.write(content)
-            stream.flush()
-            os.fsync(stream.fileno())
-        part.replace(path)
+        with whole_file(path, durable=True) as part:
+            part.write_bytes(content)
     except OSError as error:
-        part.unlink(missing_ok=True)
         raise InvalidInput(f"cannot be written: {error.strerror}", where=str(path)) from error

@@ -11,6 +11,7 @@ from urllib.parse import urlsplit
 
 from marey.core.documents import read_json
 from marey.core.errors import InvalidFile, InvalidInput, NotFound, Unauthenticated, Unreachable
+from marey.core.whole_files import whole_file
 
 MAX_BYTES = 2**16
 MAX_KEY = 2**12
@@ -100,11 +101,8 @@ def _check_address(url: str) -> None:
 def write_server(server: Server, folder: Path) -> None:
     """Write `server.json`, readable by its owner alone, in one step."""
     path = folder / "server.json"
-    temporary = path.with_suffix(".json.part")
-    descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
-    with os.fdopen(descriptor, "w", encoding="utf-8") as stream:
-        json.dump(asdict(server), stream)
-    temporary.replace(path)
+    with whole_file(path, private=True) as part:
+        part.write_text(json.dumps(asdict(server)), encoding="utf-8")
 
 
 def read_server(folder: Path) -> Server | None:

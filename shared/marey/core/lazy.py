@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from importlib import import_module
 
+from marey.core.package import own_version
+
 
 def lazy_names(package: str, places: Mapping[str, str]) -> Callable[[str], object]:
     """Return the `__getattr__` of a package.
@@ -17,9 +19,7 @@ def lazy_names(package: str, places: Mapping[str, str]) -> Callable[[str], objec
 
     def get(name: str) -> object:
         if name == "__version__":
-            from importlib.metadata import version
-
-            return version("marey")
+            return own_version()
         if name not in modules:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         return getattr(import_module(modules[name]), name)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 from marey.core.errors import InvalidInput, PluginError
+from marey.core.package import own_version
 from marey.core.suggestions import did_you_mean
 from marey.exporters.exporter import Exporter
 from marey.motion.export_options import ExportOptions
@@ -72,7 +72,7 @@ def version_of(format: str) -> str:
         PluginError: the format is not installed here.
     """
     exporter_of(format)
-    return f"{EXPORTERS.owner(format)} {EXPORTERS.version(format)}, marey {version('marey')}"
+    return f"{EXPORTERS.owner(format)} {EXPORTERS.version(format)}, marey {own_version()}"
 
 
 def check_known(formats: Iterable[str], *, hint: str = "") -> None:

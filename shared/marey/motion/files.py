@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import errno
 import os
-import secrets
 import stat
 from pathlib import Path
 
 from marey.core.errors import InvalidFile, InvalidInput, NotFound, TooLarge
+from marey.core.whole_files import whole_file
 
 
 def stamp_of(path: Path | str | None) -> tuple[int, int]:
@@ -65,17 +65,8 @@ def write_atomically(path: Path, data: bytes) -> None:
     Raises:
         InvalidInput: the folder is missing or cannot be written to.
     """
-    part = path.parent / f".{path.name[:40]}.{secrets.token_hex(4)}.part"
     try:
-        handle = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
-        try:
-            with os.fdopen(handle, "wb") as file:
-                file.write(data)
-                file.flush()
-                os.fsync(file.fileno())
-            part.replace(path)
-        except BaseException:
-            part.unlink(missing_ok=True)
-            raise
+        with whole_file(path, durable=True) as part:
+            part.write_bytes(data)
     except OSError as error:
         raise InvalidInput(f"cannot be written: {error.strerror}", where=str(path)) from None

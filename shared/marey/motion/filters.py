@@ -24,6 +24,32 @@ def smooth(values: Array, sigma: float, *, cut: float = 3.0) -> Array:
     return _windows(values, radius) @ _kernel(sigma, radius)
 
 
+def smooth_seconds(values: Array, seconds: float, fps: float) -> Array:
+    """Gaussian filter over axis 0, ends repeated, of what is measured or drawn at any frame rate.
+
+    `smooth` ends its kernel elsewhere and adds in another order, so the last bits of a motion say which of the two
+    made it: neither can stand for the other.
+
+    Args:
+        values: (T, ...).
+        seconds: standard deviation; under 0.3 frames it changes nothing.
+        fps: frames a second.
+
+    Returns:
+        float64 (T, ...).
+    """
+    sigma = seconds * fps
+    if sigma < 0.3 or len(values) < 2:
+        return np.asarray(values, np.float64)
+    radius = int(np.ceil(3 * sigma))
+    kernel = np.exp(-0.5 * (np.arange(-radius, radius + 1) / sigma) ** 2)
+    kernel /= kernel.sum()
+    flat = np.asarray(values, np.float64).reshape(len(values), -1)
+    padded = np.pad(flat, ((radius, radius), (0, 0)), mode="edge")
+    columns = [np.convolve(padded[:, c], kernel, mode="valid") for c in range(flat.shape[1])]
+    return np.stack(columns, axis=1).reshape(np.shape(values)).astype(np.float64)
+
+
 def smooth_above(values: Array, sigma: float) -> Array:
     """Return a smooth curve (T,) that is nowhere below the values: their running maximum over three sigma, smoothed."""
     radius = int(3 * sigma + 0.5)

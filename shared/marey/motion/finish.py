@@ -24,7 +24,7 @@ from marey.motion.pivoting import on_balls
 from marey.motion.pose import aim_bones, checked_joints, solve_pose
 from marey.motion.resample import frame_times, interpolate, interpolate_rotations
 from marey.motion.rotations import Array, unroll
-from marey.motion.running import on_its_steps, with_flights, with_running_steps
+from marey.motion.running import on_its_steps, running_frames, with_flights, with_running_steps
 from marey.motion.skeleton import Skeleton
 
 CLEANED = "feet_cleaned"
@@ -72,10 +72,12 @@ def finish_motion(
         hands = interpolate(hands, times)
     joints = forward_kinematics(skeleton, rotations, root)
     if clean:
-        joints = on_its_steps(on_balls(joints, skeleton, rate), skeleton, rate)
+        joints = on_balls(joints, skeleton, rate)
+        going = running_frames(joints, skeleton, rate)
+        joints = on_its_steps(joints, going, skeleton, rate)
         contacts = carrying_contacts(joints, skeleton, rate, rule=rule_for(joints, rate))
-        contacts = with_running_steps(joints, contacts, skeleton, rate)
-        joints = with_flights(joints, contacts, skeleton, rate)
+        contacts = with_running_steps(joints, contacts, going, skeleton, rate)
+        joints = with_flights(joints, contacts, going, skeleton, rate)
         joints, contacts = clean_feet(joints, skeleton, rate, contacts=contacts)
         joints = clear_arms(join_hands(joints, hands, skeleton), skeleton, rate)
         if isinstance(layout, PosedLayout):

@@ -56,9 +56,16 @@ def running_frames(joints: Array, skeleton: Skeleton, fps: float) -> Bool:
     return upright & (_speed(joints, fps) > RUNNING)
 
 
-def on_its_steps(joints: Array, skeleton: Skeleton, fps: float) -> Array:
-    """Return joints (T, J, 3) of a body that comes down to the floor in each step of its run."""
-    going = running_frames(joints, skeleton, fps)
+def on_its_steps(joints: Array, going: Bool, skeleton: Skeleton, fps: float) -> Array:
+    """Return joints (T, J, 3) of a body that comes down to the floor in each step of its run. All joints of a frame are
+    lowered alike, so the body runs in the same frames.
+
+    Args:
+        joints: (T, J, 3) metres, Y up.
+        going: (T,) `running_frames`.
+        skeleton: must have feet.
+        fps: frames a second.
+    """
     if not going.any():
         return joints
     reach = round(REACH_S * fps)
@@ -68,17 +75,17 @@ def on_its_steps(joints: Array, skeleton: Skeleton, fps: float) -> Array:
     return joints - drift[..., None] * np.array([0.0, 1.0, 0.0])
 
 
-def with_running_steps(joints: Array, contacts: Bool, skeleton: Skeleton, fps: float) -> Bool:
+def with_running_steps(joints: Array, contacts: Bool, going: Bool, skeleton: Skeleton, fps: float) -> Bool:
     """Return contacts (T, 4) with the steps of a run: of two feet, the toe that comes down and is clearly slower than
     the body.
 
     Args:
         joints: (T, J, 3) metres, Y up.
         contacts: (T, 4) that are known; they are kept.
+        going: (T,) `running_frames`.
         skeleton: must have feet.
         fps: frames a second.
     """
-    going = running_frames(joints, skeleton, fps)
     contacts = contacts.copy()
     if not going.any():
         return contacts
@@ -111,16 +118,17 @@ def _slowest(toe: Array, share: Array, step: tuple[int, int], most: int) -> tupl
     return begin, end
 
 
-def with_flights(joints: Array, contacts: Bool, skeleton: Skeleton, fps: float) -> Array:
+def with_flights(joints: Array, contacts: Bool, going: Bool, skeleton: Skeleton, fps: float) -> Array:
     """Return joints (T, J, 3) of a body that falls where it runs and no foot carries it.
 
     Args:
         joints: (T, J, 3) metres, Y up.
         contacts: (T, 4) of its feet.
+        going: (T,) `running_frames`.
         skeleton: must have feet, hips and legs.
         fps: frames a second.
     """
-    flies = _flights(joints, contacts, skeleton, fps)
+    flies = _flights(contacts, going, fps)
     if not flies.any():
         return joints
     moved, change = joints.copy(), np.zeros(len(joints))
@@ -141,11 +149,11 @@ def with_flights(joints: Array, contacts: Bool, skeleton: Skeleton, fps: float) 
     return moved
 
 
-def _flights(joints: Array, contacts: Bool, skeleton: Skeleton, fps: float) -> Bool:
+def _flights(contacts: Bool, going: Bool, fps: float) -> Bool:
     """Return the frames (T,) of the short flights of a run; those at the ends of the clip are none."""
-    going, flies = running_frames(joints, skeleton, fps), np.zeros(len(joints), bool)
+    flies = np.zeros(len(going), bool)
     for begin, end in runs(np.asarray(~contacts.any(axis=1))):
-        inside = begin > 0 and end < len(joints)
+        inside = begin > 0 and end < len(going)
         flies[begin:end] = inside and going[begin:end].all() and end - begin <= FLIGHT_S * fps
     return flies
 

@@ -18,7 +18,7 @@ from pathlib import Path
 import psutil
 
 from marey.core.errors import Unreachable
-from marey.core.private_home import open_private
+from marey.core.whole_files import whole_file
 
 TELL_SECONDS = 3.0
 FRESH = 15.0  # seconds; a status file older than this belongs to a child that no longer beats
@@ -59,10 +59,8 @@ def write_status(home: Path, name: str, status: WorkerStatus) -> None:
     """Replace the status of the worker `name`."""
     path = status_file(home, name)
     path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-    temporary = path.with_suffix(f".{os.getpid()}-{threading.get_ident()}")
-    with open_private(temporary, "w", encoding="utf-8") as stream:
-        stream.write(json.dumps(asdict(status)))
-    temporary.replace(path)
+    with whole_file(path, private=True) as part:
+        part.write_text(json.dumps(asdict(status)), encoding="utf-8")
 
 
 def check_health(home: Path, *, ready: bool = False, now: float | None = None) -> None:

@@ -7,6 +7,7 @@ as the gesture alone, or made in one pass, which stands up for it.
 from __future__ import annotations
 
 import re
+from collections.abc import Callable, Mapping
 
 from marey.text.action_reader import named_actions
 from marey.vocabulary.bearing_words import stated_bearings
@@ -50,21 +51,30 @@ _POSTURES = {"crouch": "crouching", "squat": "squatting"}
 
 def with_posture_first(prompt: str) -> str:
     """Return a prompt in which a body that gestures in a posture is in that posture first, and then gestures."""
-    found = _ADJECTIVE.match(prompt)
-    if found is not None and _gestures(found["does"], prompt):
-        article = found["det"] if found["det"].lower() not in ("a", "an") else _article(found["noun"], found["det"])
-        return f"{found['start']}{article} {found['noun']} is {found['being']}, then {found['does']}{found['end']}"
-    found = _MEANWHILE.match(prompt)
-    if found is not None and _gestures(found["does"], prompt):
-        return f"{found['start']}{found['who']}is {found['being']}{found['where']}, then {found['does']}{found['end']}"
-    found = _AND.match(prompt)
-    if found is not None and _gestures(found["does"], prompt):
-        return f"{found['start']}{found['who']}{found['being']}{found['where']}, then {found['does']}{found['end']}"
-    found = _FROM.match(prompt)
-    if found is not None and (_gestures(found["does"], prompt) or _rises(found)):
-        being = found["named"] or _POSTURES.get((found["low"] or "").lower()) or f"kneeling on {found['knee']}"
-        return f"{found['start']}{found['who']}is {being}, then {found['does']}{found['end']}"
+    for pattern, posture in _POSTURE_OF.items():
+        found = pattern.match(prompt)
+        if found is not None and (_gestures(found["does"], prompt) or (pattern is _FROM and _rises(found))):
+            return f"{found['start']}{posture(found)}, then {found['does']}{found['end']}"
     return prompt
+
+
+def _of_adjective(found: re.Match[str]) -> str:
+    article = found["det"] if found["det"].lower() not in ("a", "an") else _article(found["noun"], found["det"])
+    return f"{article} {found['noun']} is {found['being']}"
+
+
+def _of_name(found: re.Match[str]) -> str:
+    being = found["named"] or _POSTURES.get((found["low"] or "").lower()) or f"kneeling on {found['knee']}"
+    return f"{found['who']}is {being}"
+
+
+_POSTURE_OF: Mapping[re.Pattern[str], Callable[[re.Match[str]], str]] = {
+    _ADJECTIVE: _of_adjective,
+    _MEANWHILE: lambda found: f"{found['who']}is {found['being']}{found['where']}",
+    _AND: lambda found: f"{found['who']}{found['being']}{found['where']}",
+    _FROM: _of_name,
+}
+"""Makers of the words of the posture, by the pattern that finds it; the first that fits decides."""
 
 
 def _gestures(does: str, prompt: str) -> bool:

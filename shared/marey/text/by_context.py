@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 
+from marey.vocabulary.inflection import in_form_of
+
 _ENDS = r"(?=\W*$|[,.;]| (?:and|then|from|again|twice)\b)"
 _BASKETBALL = re.compile(r"\b(?:basketball\w*|dribbl\w+|hoop|three[- ]pointer|free throw|jump shot)\b", re.IGNORECASE)
 _SOCCER = re.compile(r"\b(?:soccer|football(?:er)?|striker|penalty|goalkeeper)\b", re.IGNORECASE)
@@ -50,5 +52,5 @@ def with_words_by_context(prompt: str) -> str:
 
 def _draws_bow(found: re.Match[str]) -> str:
     """Return the draw with its bow; the shot is part of it."""
-    looses = "shoots an arrow" if found["looses"].lower().endswith("s") else "shoot an arrow"
+    looses = f"{in_form_of(found['looses'], 'shoot')} an arrow"
     return f"{found['draws']} the bow{found['joint']}{found['aims'] or ''} {looses}"

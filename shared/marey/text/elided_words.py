@@ -6,9 +6,9 @@ from __future__ import annotations
 import re
 
 from marey.vocabulary.inflection import third_person
-from marey.vocabulary.lengths import TO_TWENTY
+from marey.vocabulary.lengths import TO_TWELVE
 
-_NUMBER = rf"(?:{'|'.join(TO_TWENTY.split()[:12])}|\d{{1,2}})"
+_NUMBER = rf"(?:{TO_TWELVE}|\d{{1,2}})"
 _TIMES = rf"(?:once|twice|thrice|{_NUMBER}[ ](?:more[ ])?times)"
 _LIMB = r"(?:hand|arm|foot|leg|knee|fist|elbow|palm|side|shoulder|forearm|heel)"
 _ON = r"(?:on|with|to|using|from|over)"

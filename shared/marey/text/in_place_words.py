@@ -5,13 +5,14 @@ from __future__ import annotations
 import re
 
 from marey.vocabulary.in_place import goes_in_place
+from marey.vocabulary.inflection import in_form_of
 
 _PLAINER = (
-    (re.compile(r"\btrot(?P<s>s)?(?P<ing>ting)?\b", re.IGNORECASE), "jog", "ging"),
-    (re.compile(r"\b(?:stride|strid(?=ing)|pace|pac(?=ing))(?P<s>s)?(?P<ing>ing)?\b", re.IGNORECASE), "march", "ing"),
-    (re.compile(r"\btread(?P<s>s)?(?P<ing>ing)?\b", re.IGNORECASE), "walk", "ing"),
+    (re.compile(r"\btrot(?P<s>s)?(?P<ing>ting)?\b", re.IGNORECASE), "jog"),
+    (re.compile(r"\b(?:stride|strid(?=ing)|pace|pac(?=ing))(?P<s>s)?(?P<ing>ing)?\b", re.IGNORECASE), "march"),
+    (re.compile(r"\btread(?P<s>s)?(?P<ing>ing)?\b", re.IGNORECASE), "walk"),
 )
-"""Verbs, and the base and the ending of -ing of those that models know."""
+"""Verbs, and those that models know."""
 _HIGH_KNEES = re.compile(
     r"^(?P<who>\W*(?:(?:a|an|the) (?:\w+ )?\w+ )?)(?:(?:does|do|doing|performs?|performing) )?high[ -]knees?"
     r"(?P<here> (?:in place|on the spot))",
@@ -24,11 +25,6 @@ def with_plain_gait_in_place(prompt: str) -> str:
     prompt = _HIGH_KNEES.sub(r"\g<who>runs\g<here> with high knees", prompt)
     if not goes_in_place(prompt, "walk"):
         return prompt
-    for pattern, base, ending in _PLAINER:
-        prompt = pattern.sub(
-            lambda found, base=base, ending=ending: (
-                base + (ending if found["ing"] else ("es" if base.endswith("ch") else "s") if found["s"] else "")
-            ),
-            prompt,
-        )
+    for pattern, verb in _PLAINER:
+        prompt = pattern.sub(lambda found, verb=verb: in_form_of(found["ing"] or found["s"] or "", verb), prompt)
     return prompt

@@ -7,7 +7,6 @@ import hashlib
 import io
 import json
 import logging
-import secrets
 import time
 from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 
 from marey.core.errors import MareyError
 from marey.core.private_home import FOLDER_MODE, open_private
+from marey.core.whole_files import whole_file
 from marey.motion.files import read_limited
 
 log = logging.getLogger(__name__)
@@ -73,14 +73,8 @@ class KeptVectors:
             yield
 
     def _write(self, path: Path, vectors: NDArray[np.float32]) -> None:
-        part = path.with_name(f".{secrets.token_hex(8)}.part")
-        try:
-            with open_private(part, "xb") as file:
-                np.lib.format.write_array(file, vectors, allow_pickle=False)
-            part.replace(path)
-        except BaseException:
-            part.unlink(missing_ok=True)
-            raise
+        with whole_file(path, private=True) as part, part.open("wb") as file:
+            np.lib.format.write_array(file, vectors, allow_pickle=False)
 
     def _name(self, texts: Sequence[str]) -> str:
         return hashlib.sha256(json.dumps([self._encoder, *texts]).encode()).hexdigest()

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from functools import lru_cache
 
-from marey.vocabulary.inflection import forms_of_other, verb_forms
+from marey.vocabulary.inflection import forms_of_other, in_present_form_of, verb_forms
 
 _WALK = "walk"
 _WAYS: Mapping[str, tuple[tuple[str, ...], str, str]] = {
@@ -36,10 +36,15 @@ _SITS = re.compile(
     re.IGNORECASE | re.VERBOSE,
 )
 """A body that sits down in a way of its own, of which the readers make two movements, or a fall."""
-COLD = re.compile(
-    r"\b(?:cold|freezing|snow\w*|ic[ey]\w*|winter\w*|blizzard|frost\w*|shiver\w*|death|arctic|teeth|trembl\w*)\b",
+_FREEZES_THEN = re.compile(
+    r"(?P<joint>(?:[,;.]|\band|\bthen|\bhe|\bshe) )freeze(?P<s>s)?(?: in place)?(?=\s*(?:[,;.]|$|and\b|then\b))",
     re.IGNORECASE,
 )
+"""The same behind another movement."""
+_CHILL = r"cold|freezing|snow\w*|ic[ey]\w*|winter|blizzard|frost\w*|shiver\w*|death"
+_COLD = re.compile(rf"\b(?:{_CHILL})\b", re.IGNORECASE)
+_COLD_FIRST = re.compile(rf"\b(?:{_CHILL}|winter\w*|arctic|teeth|trembl\w*)\b", re.IGNORECASE)
+"""Words of who is cold: by more words where a prompt begins with it."""
 
 
 def with_known_verbs(prompt: str) -> str:
@@ -48,17 +53,23 @@ def with_known_verbs(prompt: str) -> str:
         behind = _WAYS[verb][2]
         prompt = pattern.sub(lambda found, behind=behind: f"{_forms()[found['verb'].lower()]}{behind}", prompt)
     prompt = _SITS.sub(_sits, prompt)
-    if COLD.search(_FREEZES.sub("", prompt)):
+    if _COLD_FIRST.search(_FREEZES.sub("", prompt)):
         return prompt
     return _FREEZES.sub(lambda it: f"{it['who']}stand{'ing' if it['ing'] else it['s'] or ''} still", prompt)
+
+
+def with_sudden_stops(prompt: str) -> str:
+    """Return a prompt in which a body that freezes behind another movement stands still, unless someone is cold."""
+    if _COLD.search(prompt):
+        return prompt
+    return _FREEZES_THEN.sub(lambda it: f"{it['joint']}stand{it['s'] or ''} still", prompt)
 
 
 def _sits(found: re.Match[str]) -> str:
     """Return a body that sits down on the same seat; a noun, such as "a drop onto the bench", as it is."""
     if found["noun"]:
         return found[0]
-    end = (found["end"] or "").lower()
-    sits = "sitting" if end.endswith("ing") else "sits" if end else "sit"
+    sits = in_present_form_of(found["end"] or "", "sit")
     how = f" {found['how']}" if found["how"] else ""
     return f"{sits} down{how} {found['where']}"
 

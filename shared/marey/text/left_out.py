@@ -24,6 +24,7 @@ from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.gazes import only_gaze, without_gaze
 from marey.vocabulary.loads import puts_load
 from marey.vocabulary.scope import STANDING, every_action, match_scope
+from marey.vocabulary.stops import comes_to_a_stop
 from marey.vocabulary.word_lists import load_word_lists
 
 IN_TIME = "ARGM-TMP"
@@ -34,11 +35,6 @@ _WORD = re.compile(r"[a-z]+(?:['’-][a-z]+)*")
 _JOINTS = re.compile(r"[,;:.]\s|\b(?:and|then|while|as|before|after|until|but)\b", re.IGNORECASE)
 """Words and signs between clauses."""
 _SIGNS = " ,.;:!?()\"'"
-_SKIDS = re.compile(
-    r"(?:skid|slid|slow|com|grind|screech)\w*\s(?:down\s)?(?:to|into)\s(?:an?\s)?(?:\w+\s)?(?:stop|halt|standstill)\b",
-    re.IGNORECASE,
-)
-"""The way in which a run ends: "slides to a stop"."""
 
 
 @dataclass(frozen=True)
@@ -189,8 +185,8 @@ def _is_said(clause: _Clause, row: ReadMovement | None, named: frozenset[str]) -
         return True
     if named & set(_WORD.findall(clause.verb)) and not (_is_as_written(row)):
         return True
-    stops = STOPS.match(text) or _SKIDS.match(text) or HERE.match(text)
-    return is_end(without_joints(text)) or goes_on(text) or stops is not None
+    stops = STOPS.match(text) is not None or HERE.match(text) is not None or comes_to_a_stop(text)
+    return is_end(without_joints(text)) or goes_on(text) or stops
 
 
 def _is_own(clause: _Clause, clauses: Sequence[_Clause]) -> bool:

@@ -1,10 +1,44 @@
-"""Feet that slip or trip, and bodies that are knocked down, told as the fall that they end in: "trips over a log", "is
-knocked to the ground"."""
+"""Feet that slip or trip, and bodies that are knocked down or thrown by a blast, told as the fall that they end in:
+"trips over a log", "is knocked to the ground", "the bomb hurls her backwards" (ours)."""
 
 from __future__ import annotations
 
 import re
 
+from marey.vocabulary.inflection import in_present_form_of
+
+DET = r"(?:(?:an?|the|his|her|their|its|some|another)\ )?"
+"""Words before a noun, and a blank."""
+_BLAST = r"(?:explosions?|explosive|blasts?|bombs?|grenades?|shock\ ?waves?|detonations?|land ?mine|rocket|missile)"
+_THROWN = r"(?:knocked|blown|thrown|hurled|flung|blasted|tossed|launched|swept|catapulted|lifted|sent|propelled)"
+MOVEMENT_ENDS = r"(?=\W*$|[,.;]|\ (?:and|then|but|before|while)\b)"
+"""Behind the words of a movement."""
+_BLOWN = re.compile(
+    rf"""\b(?:(?:is|are|gets?|getting|being|was|were)\ )?{_THROWN}(?:\ (?!(?:by|and|then|in|from)\b)[\w-]+){{0,8}}?
+    \ (?:by|in|from|with)\ {DET}(?:(?:force|power|impact|shock)\ (?:of|from)\ )?{DET}(?:[\w-]+\ ){{0,2}}?{_BLAST}
+    (?:\ (?!and\b|then\b|but\b|before\b|while\b)[\w-]+){{0,6}}{MOVEMENT_ENDS}""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""A body that a blast throws: "knocked flat by an explosion"."""
+_OFF_FEET = re.compile(
+    rf"\b(?:(?:is|are|gets?|was) )?(?:blown|blasted|hurled|flung|thrown) (?:(?:clean|right|straight) )?"
+    rf"(?:off (?:his|her|their|its) feet|backwards? through the air|through the air){MOVEMENT_ENDS}",
+    re.IGNORECASE,
+)
+_BLAST_THROWS = re.compile(
+    rf"""\b{DET}(?:[\w-]+\ ){{0,2}}?{_BLAST}(?:\ (?:nearby|behind\ \w+|close\ by|goes\ off\ and))?
+    \ (?:knock|throw|hurl|fling|blow|blast|toss|launch|send|sweep|lift)(?:e?s|ing)?\ (?:him|her|them|it
+    |(?:the|a)\ [\w-]+)(?:\ (?!and\b|then\b|but\b|before\b|while\b)[\w-]+){{0,8}}{MOVEMENT_ENDS}""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""The same told of the blast: "the blast hurls her backwards"."""
+_KNOCKBACK = re.compile(
+    rf"^\W*(?:{_BLAST} (?:knock ?(?:back|down)|reaction|hit|fall|death)"
+    rf"|(?:knock(?:ed)? ?(?:back|down)|death|hit|react\w*|blown) (?:by )?{_BLAST})\W*$",
+    re.IGNORECASE,
+)
+THROWN_BACK = "falls backward, thrown by an explosion"
+"""Words of a body that a blast throws onto its back."""
 _OBJECT = r"(?:(?:a|an|the|some|his|her|their|its|that)\ )?(?:[\w-]+\ ){0,2}?"
 _UNDERFOOT = r"""(?:ice|icy\ \w+|black\ ice|banana(?:\ (?:peel|skin))?s?|peels?|floor|puddles?|water|oil|soap|mud|snow
     |grass|stairs?|steps?|ground|marbles?|rug|deck|sidewalk|pavement|leaf|leaves|blood|tiles?|path|street|spill|grease|moss|rocks?
@@ -73,7 +107,14 @@ _DOWNS = re.compile(
 _DENIED = re.compile(r"\b(?:almost|nearly|without|not|never|avoids?)\ (?:\w+\ )?$", re.IGNORECASE | re.VERBOSE)
 _HOW = {"slip": "on the back with slipping feet", "trip": "on the face with tripping feet"}
 """The way in which it falls: a verb of its own would be read as another movement."""
-_AS_END = {"": "", "s": "s", "es": "s", "e": "", "ing": "ing", "ping": "ing", "ped": "s", "t": "s"}
+
+
+def with_thrown_bodies(prompt: str) -> str:
+    """Return a prompt in which a body that a blast throws falls backward; as it is written, before its actions are put
+    in the order of time: the words of a blast are no action."""
+    for pattern in (_BLOWN, _BLAST_THROWS, _OFF_FEET, _KNOCKBACK):
+        prompt = pattern.sub(THROWN_BACK, prompt)
+    return prompt
 
 
 def with_falls(prompt: str) -> str:
@@ -89,8 +130,7 @@ def _falls(found: re.Match[str], verb: str) -> str:
     """Return a fall in the form of the verb that is found."""
     if _DENIED.search(found.string[: found.start()]):
         return found[0]
-    end = _AS_END[(found["end"] or "").lower()]
-    return f"fall{end} {_HOW[verb]}"
+    return f"{in_present_form_of(found['end'] or '', 'fall')} {_HOW[verb]}"
 
 
 def _knocked_down(found: re.Match[str]) -> str:

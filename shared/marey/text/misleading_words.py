@@ -388,7 +388,7 @@ def _lies(found: re.Match[str]) -> str:
     """Return a body that lies on another side; one that lay before comes to it, as a movement of its own."""
     if found[0].lower().startswith("turn") and not _LYING.search(found.string):
         return found[0]
-    lies = "lying" if found["ing"] else "lies" if found["s"] else "lie"
+    lies = in_form_of(found["ing"] or found["s"] or "", "lie")
     if found["where"] and not found["where"].endswith("side") and _LAY.search(found.string[: found.start()]):
         return f"{lies} down on {found['where']}"
     return f"{lies} on {found['where']}" if found["where"] else f"{lies} "

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 
-from marey.vocabulary.inflection import third_person
+from marey.vocabulary.inflection import in_form_of
 from marey.vocabulary.lengths import TO_TEN
 
 _WHO = r"(?:(?:he|she|they|it)\ )?"
@@ -140,7 +140,7 @@ def with_plain_phrases(prompt: str) -> str:
     text = _PICKS_SELF_UP.sub(_gets_up, _PATROLS.sub(_walks_along, text))
     text = _GOES_ON.sub(r"\g<stumbles>, then ", text)
     if _HIDES.search(text):
-        text = _DROPS_BACK.sub(lambda it: f"crouch{'es' if it['s'] else ''} down", text)
+        text = _DROPS_BACK.sub(lambda it: f"{in_form_of(it['s'] or '', 'crouch')} down", text)
     text = _COMES_UP.sub("", text)
     text = _TURNED_AND_COMES.sub(lambda it: f"{it['turn']}walk{it['s'] or ''} forward", text)
     text = _GOES_BACK.sub(_turned_back, text)
@@ -148,7 +148,7 @@ def with_plain_phrases(prompt: str) -> str:
     text = _HIGH_KNEES.sub(lambda it: f"run{'s' if it['does'] == 'does' else ''} in place with high knees", text)
     text = _MORE.sub(lambda it: f"{it['before']} {it['what'].removeprefix('more ')}", text)
     text = _WAY_AND_ANOTHER.sub(_with_verb, text)
-    text = _EXAMINES.sub(lambda it: f"look{'ing' if it['ing'] else 's' if it['s'] else ''} down at the ground", text)
+    text = _EXAMINES.sub(lambda it: f"{in_form_of(it['ing'] or it['s'] or '', 'look')} down at the ground", text)
     text = _JUMPS_BACK_OVER.sub(r"\g<jump> backwards", text)
     text = _PUTS_IT.sub(_puts_box, text)
     text = _INTO_GUARD.sub(_steps_into_guard, text)
@@ -161,7 +161,7 @@ def _gets_up(found: re.Match[str]) -> str:
 
 
 def _walks_along(found: re.Match[str]) -> str:
-    walks = {"s": "walks", "ling": "walking"}.get((found["end"] or "").lower(), "walk")
+    walks = in_form_of(found["end"] or "", "walk")
     return f"{found['subject']}{walks}{' along ' if found['along'] else ''}"
 
 
@@ -195,4 +195,4 @@ def _puts_box(found: re.Match[str]) -> str:
 def _with_verb(found: re.Match[str]) -> str:
     """Return a way, and the next one with the same verb."""
     verb, s = found["verb"] or found["verb2"], found["s"] or found["s2"]
-    return f"{found['first']}, then {third_person(verb.lower()) if s else verb.lower()} "
+    return f"{found['first']}, then {in_form_of(s or '', verb.lower())} "

@@ -35,7 +35,6 @@ from marey.text.sequence_reader import (
     rest,
     sequence_reader,
     turned_to_carry,
-    way_to_a_stop,
     way_to_rest,
 )
 from marey.text.told_apart import told_apart
@@ -45,6 +44,7 @@ from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.gazes import only_gaze, stated_gaze, without_gaze
 from marey.vocabulary.lengths import is_length, stated_length
 from marey.vocabulary.scope import STANDING, every_action, match_scope
+from marey.vocabulary.stops import way_to_a_stop
 from marey.vocabulary.who_acts import says_more
 
 SURELY, SURELY_AGREED = 0.9, 0.4

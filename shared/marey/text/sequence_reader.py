@@ -39,12 +39,14 @@ from marey.text.reader_file import Float32, Reader
 from marey.vocabulary.bearing_words import BarePrompt
 from marey.vocabulary.bearings import DRAWN_AS
 from marey.vocabulary.counts import STEPPING, stated_count
+from marey.vocabulary.courses import RUNS
 from marey.vocabulary.distances import stated_distance
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.gazes import only_gaze, without_gaze
 from marey.vocabulary.inflection import phrase_in_third_person
 from marey.vocabulary.peeks import only_peeks
 from marey.vocabulary.scope import STANDING, every_action, match_scope
+from marey.vocabulary.stops import way_to_a_stop
 
 FILE = Path(__file__).with_name("sequence_reader.safetensors")
 VERSION = 14
@@ -72,20 +74,13 @@ LIKELY = 0.3
 """Probability from which on a clause whose words name no action has the likeliest."""
 WAYS = frozenset({"walk", "run", "sprint", "sneak", "walk-backward"})
 """Actions that a stop ends."""
-RUNS, JUMPS = frozenset({"run", "sprint"}), frozenset({"jump", "jump-forward"})
+JUMPS = frozenset({"jump", "jump-forward"})
 ON_FEET = WAYS | RISING | {"jump", "jump-forward", "leap", "hop", "climb-stairs", "climb-ladder", "climb-onto", "dance"}
 """Actions behind which a body is on its feet, though it sat before."""
 DRAWN_S = 1.8
 """Seconds of an action that is drawn as a gesture, beside other actions."""
 REST_S = 2.0
 """Seconds of standing that a stop is read as."""
-_STOP = re.compile(
-    r"""(?:,|\s(?:and|then|before|until\s(?:he|she|they|it)|to|,))(?:\s(?:and|then|to)){0,2}\s
-    (?:(?:com|slow|grind|skid|roll|draw)\w*\s(?:down\s)?to\s)?(?:an?\s)?
-    (?:sudden(?:ly)?\s|abrupt(?:ly)?\s|complete\s|full\s|dead\s)?
-    (?:stops?|halts?|standstill|stands?\sstill|idle)(?:\s(?:dead|short|there|abruptly|suddenly|completely))?\W*$""",
-    re.IGNORECASE | re.VERBOSE,
-)
 _TO_A_SEAT = re.compile(
     r"\s(?:(?:over|up|back|out)\s)?(?:to|towards?)\s(?:the|an?|his|her|their|its)\s(?:\w+\s)?"
     r"(?:throne|chair|armchair|seat|sofa|couch|bench|stool|bed)s?\b",
@@ -302,13 +297,6 @@ def clause_inputs(
     around = np.zeros_like(vector) if within is None else within
     parts = vector * VECTOR_SCALE, word_marks(text, classes)[:-1], around * STATE_SCALE
     return np.concatenate(parts).astype(np.float32)
-
-
-def way_to_a_stop(text: str) -> str:
-    """Return the words before the stop that a text ends with: "walks up to the door" of "walks up to the door and
-    stops"; empty if it ends with none."""
-    match = _STOP.search(text)
-    return text[: match.start()].strip(" ,;") if match is not None else ""
 
 
 def way_to_rest(text: str, action: str | None) -> str:

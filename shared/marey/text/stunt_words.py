@@ -1,43 +1,14 @@
-"""Stunts in the words of movements that readers know (ours): blasts that throw a body, drops from ledges, ropes to
+"""Stunts in the words of movements that readers know (ours): drops from ledges, ropes to
 balance on, ledges to edge along, the recoil of a shot, feet that slip on landing, steps back after a shove."""
 
 from __future__ import annotations
 
 import re
 
-from marey.vocabulary.inflection import third_person
+from marey.text.lost_footing import DET, MOVEMENT_ENDS, with_thrown_bodies
+from marey.vocabulary.inflection import in_form_of
 
-_DET = r"(?:(?:an?|the|his|her|their|its|some|another)\ )?"
 _WHO = r"(?:he|she|they|it)"
-_BLAST = r"(?:explosions?|explosive|blasts?|bombs?|grenades?|shock\ ?waves?|detonations?|land ?mine|rocket|missile)"
-_THROWN = r"(?:knocked|blown|thrown|hurled|flung|blasted|tossed|launched|swept|catapulted|lifted|sent|propelled)"
-_ENDS = r"(?=\W*$|[,.;]|\ (?:and|then|but|before|while)\b)"
-_BLOWN = re.compile(
-    rf"""\b(?:(?:is|are|gets?|getting|being|was|were)\ )?{_THROWN}(?:\ (?!(?:by|and|then|in|from)\b)[\w-]+){{0,8}}?
-    \ (?:by|in|from|with)\ {_DET}(?:(?:force|power|impact|shock)\ (?:of|from)\ )?{_DET}(?:[\w-]+\ ){{0,2}}?{_BLAST}
-    (?:\ (?!and\b|then\b|but\b|before\b|while\b)[\w-]+){{0,6}}{_ENDS}""",
-    re.IGNORECASE | re.VERBOSE,
-)
-"""A body that a blast throws: "knocked flat by an explosion"."""
-_OFF_FEET = re.compile(
-    rf"\b(?:(?:is|are|gets?|was) )?(?:blown|blasted|hurled|flung|thrown) (?:(?:clean|right|straight) )?"
-    rf"(?:off (?:his|her|their|its) feet|backwards? through the air|through the air){_ENDS}",
-    re.IGNORECASE,
-)
-_BLOWS = re.compile(
-    rf"""\b{_DET}(?:[\w-]+\ ){{0,2}}?{_BLAST}(?:\ (?:nearby|behind\ \w+|close\ by|goes\ off\ and))?
-    \ (?:knock|throw|hurl|fling|blow|blast|toss|launch|send|sweep|lift)(?:e?s|ing)?\ (?:him|her|them|it
-    |(?:the|a)\ [\w-]+)(?:\ (?!and\b|then\b|but\b|before\b|while\b)[\w-]+){{0,8}}{_ENDS}""",
-    re.IGNORECASE | re.VERBOSE,
-)
-"""The same told of the blast: "the blast hurls her backwards"."""
-_KNOCKBACK = re.compile(
-    rf"^\W*(?:{_BLAST} (?:knock ?(?:back|down)|reaction|hit|fall|death)"
-    rf"|(?:knock(?:ed)? ?(?:back|down)|death|hit|react\w*|blown) (?:by )?{_BLAST})\W*$",
-    re.IGNORECASE,
-)
-THROWN_BACK = "falls backward, thrown by an explosion"
-"""Words of a body that a blast throws onto its back."""
 _HEIGHT = r"""(?:ledges?|roofs?|rooftops?|balcon(?:y|ies)|walls?|crates?|box|platforms?|window(?:\ ?sill)?s?|fences?
     |trucks?    |cliffs?|rocks?
     |boulders?|branch|tree|bridge|stage|scaffold(?:ing)?|loft|horse|wagon|car|vehicle|table|chair|bench
@@ -54,7 +25,7 @@ _ROPE = r"""(?:tight\ ?ropes?|slack\ ?lines?|(?:balance\ )?beams?|wires?
     |(?:narrow|thin|fallen|single)\ (?:plank|wall|log|rail|bridge|board|tree|trunk|pole|ledge|beam))"""
 _BALANCES = re.compile(
     rf"""\b(?P<verb>balanc(?:e(?P<s>s)?|ing)|cross(?P<s2>es|ing)?|teeters?|totters?)(?P<how>(?:\ \w+ly){{0,2}})
-    (?:\ (?:his|her|their)\ way)?(?:\ (?:across|along|over))?\ (?P<rope>{_DET}(?:[\w-]+\ ){{0,2}}?{_ROPE})\b""",
+    (?:\ (?:his|her|their)\ way)?(?:\ (?:across|along|over))?\ (?P<rope>{DET}(?:[\w-]+\ ){{0,2}}?{_ROPE})\b""",
     re.IGNORECASE | re.VERBOSE,
 )
 """A walk over a rope or a beam, of which readers make who stands on one leg."""
@@ -63,9 +34,9 @@ _ROPE_WALK = re.compile(
 )
 _SIDLES = re.compile(
     rf"""\b(?:shimm(?:y|ies|ying)|inch(?:es|ing)?|edg(?:es?|ing)|sidl(?:es?|ing)|shuffl(?:es?|ing)|travers(?:es?|ing)
-    |creep(?:s|ing)?)(?:\ (?:{_DET}way|slowly|carefully|cautiously|sideways|nervously))*
+    |creep(?:s|ing)?)(?:\ (?:{DET}way|slowly|carefully|cautiously|sideways|nervously))*
     \ (?:(?:over\ |off\ )?to\ (?:the|his|her)\ )?(?P<side>left|right)(?:wards?)?(?:\ (?:sideways|slowly|carefully))?
-    \ (?P<where>(?:along|across|on|over)\ {_DET}(?:[\w-]+\ ){{0,3}}?
+    \ (?P<where>(?:along|across|on|over)\ {DET}(?:[\w-]+\ ){{0,3}}?
     (?:ledge|wall|cliff|edge|sill|windowsill|parapet|beam|cornice|rim|shelf|roof|rooftop|catwalk|precipice))\b""",
     re.IGNORECASE | re.VERBOSE,
 )
@@ -97,7 +68,7 @@ _STAGGERS = re.compile(
     (?P<steps>\ (?:\w+|a\ few|a\ couple\ of)\ (?:steps?|paces?))?
     \ (?:after|from|when|as|because\ of|following)\ (?:{_WHO}\ (?:is\ )?)?(?:being\ |getting\ )?
     (?:shoved|pushed|hit|punched|struck|kicked
-    |{_DET}(?:\w+\ )?(?:shove|push|hit|punch|blow|kick|strike|impact|slap)){_ENDS}""",
+    |{DET}(?:\w+\ )?(?:shove|push|hit|punch|blow|kick|strike|impact|slap)){MOVEMENT_ENDS}""",
     re.IGNORECASE | re.VERBOSE,
 )
 """Steps back that a blow causes."""
@@ -124,9 +95,7 @@ _LANDS_LOW = re.compile(
 
 def with_plain_stunts(prompt: str) -> str:
     """Return a prompt in which such stunts are told in words that readers know."""
-    text = _KNOCKBACK.sub(
-        THROWN_BACK, _OFF_FEET.sub(THROWN_BACK, _BLOWS.sub(THROWN_BACK, _BLOWN.sub(THROWN_BACK, prompt)))
-    )
+    text = with_thrown_bodies(prompt)
     text = _BOTH_SIDES.sub(r"\g<first>, then \g<second>", _DROPS.sub(_drops, text))
     text = _LANDS_LOW.sub(lambda it: f"{it['jump']} landing low", text)
     text = _ASIDE.sub(r"\g<jump> sideways to the \g<side>", text)
@@ -145,14 +114,12 @@ def _drops(found: re.Match[str]) -> str:
     words = found[0].lower()
     if not _FROM.search(words) and " above" not in words:
         return found[0]
-    jumps = "jumps" if (found["end"] or "").lower() == "s" else "jumping" if found["end"] else "jump"
-    return f"{jumps} down from {found['place']}"
+    return f"{in_form_of(found['end'] or '', 'jump')} down from {found['place']}"
 
 
 def _walks_over(found: re.Match[str]) -> str:
     word = found["verb"].lower()
-    walks = "walking" if word.endswith("ing") else "walks" if word.endswith("s") and word != "cross" else "walk"
-    return f"{walks}{found['how']} across {found['rope']}"
+    return f"{in_form_of('' if word == 'cross' else word, 'walk')}{found['how']} across {found['rope']}"
 
 
 def _without_recoil(found: re.Match[str]) -> str:
@@ -162,9 +129,8 @@ def _without_recoil(found: re.Match[str]) -> str:
 
 def _then_slips(found: re.Match[str]) -> str:
     verb = found["verb"].lower()
-    does = third_person(verb) if found["s"] else verb
     behind = found["falls"] or ("" if verb == "slip" else " forward")
-    return f", then {does}{behind}"
+    return f", then {in_form_of(found['s'] or '', verb)}{behind}"
 
 
 def _knocked_back(found: re.Match[str]) -> str:

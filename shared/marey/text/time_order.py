@@ -10,11 +10,12 @@ import re
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
 
+from marey.text.known_verbs import with_sudden_stops
 from marey.text.negated_order import without_negated_order
 from marey.text.told_later import WHO, told_in_order
 from marey.vocabulary.bearings import bearing_words
 from marey.vocabulary.entries import load_vocabulary
-from marey.vocabulary.inflection import gerund, phrase_in_third_person, third_person
+from marey.vocabulary.inflection import gerund, in_form_of, phrase_in_third_person
 from marey.vocabulary.word_lists import load_word_lists
 
 _WHO = WHO.replace(" ", r"\ ")
@@ -49,12 +50,6 @@ _FALLS_AND_CLIMBS = re.compile(
     re.IGNORECASE | re.VERBOSE,
 )
 """A fall behind which one comes to one's feet by other words than "gets up"."""
-_FREEZES = re.compile(
-    r"(?P<joint>(?:[,;.]|\band|\bthen|\bhe|\bshe) )freeze(?P<s>s)?(?: in place)?(?=\s*(?:[,;.]|$|and\b|then\b))",
-    re.IGNORECASE,
-)
-"""A sudden stop, of which the readers make one who is cold."""
-_COLD = re.compile(r"\b(?:cold|freezing|snow\w*|ic[ey]\w*|winter|blizzard|frost\w*|shiver\w*|death)\b", re.IGNORECASE)
 _GAIT = r"(?:walk|run|jog|sprint|sneak|march|stroll|limp|dash|crawl|go|head|creep)"
 _OPPOSITE = re.compile(
     rf"""(?:(?P<turns>\bturns?)\ )?
@@ -135,8 +130,7 @@ def in_time_order(prompt: str) -> str:
     text = _AFTER.sub(_after, _BEFORE.sub(_before, text))
     text = _BACK_UP.sub(r"\g<rise> up", _TRIPS.sub(_trips, text))
     text = _FALLS_AND_CLIMBS.sub(lambda up: f"{up['falls']}get{up['s'] or ''} up", text)
-    text = text if _COLD.search(text) else _FREEZES.sub(lambda it: f"{it['joint']}stand{it['s'] or ''} still", text)
-    text = _CARRIES_ON.sub(_carries_on, text)
+    text = _CARRIES_ON.sub(_carries_on, with_sudden_stops(text))
     text = _COUNTED_BEFORE_TURN.sub(_steps_and_turn, _ENDS_BY.sub(_ends, text))
     text = _IN_TURN.sub(r"\g<verb>\g<how>, then ", _PUNCH_BEFORE.sub(r"\g<punch>, then ", text))
     return _OPPOSITE.sub(_turned, _DOER.sub(_does, text))
@@ -183,7 +177,7 @@ def _carries_on(found: re.Match[str]) -> str:
     verb = _verbs_of_gerunds().get(found["verb"].lower())
     if verb is None:
         return f"{'keeps' if said.lower().endswith('s') else 'keep'} {found['verb']}"
-    return third_person(verb) if said.lower().split()[0].endswith("s") else verb
+    return in_form_of(said.split()[0], verb)
 
 
 def _trips(found: re.Match[str]) -> str:
@@ -199,20 +193,19 @@ def _ends(found: re.Match[str]) -> str:
 
 def _steps_and_turn(found: re.Match[str]) -> str:
     """Return steps, a turn and a way, one after the other."""
-    third = found["turn"].lower().startswith("turns")
     way = _verbs_of_gerunds().get((found["again"] or "walking").lower(), "walk")
-    return f"{found['steps']}, then {found['turn']}, then {third_person(way) if third else way} forward"
+    turns = found["turn"].split()[0]
+    return f"{found['steps']}, then {found['turn']}, then {in_form_of(turns, way)} forward"
 
 
 def _turned(found: re.Match[str]) -> str:
     """Return a way behind the turn that it begins with; without another where one is told before."""
-    third = found["s"] is not None
     if found["turns"]:  # "turns and walks in the opposite direction"
         return f"{found['turns']} around and then {found['way']}{found['s'] or ''} away"
     way = f"{found['way']}{found['s'] or ''} away"
     if _TURNED.search(found.string[: found.start("way")]):
         return f"{found['joint']}{way}"
-    return f"{found['joint']}turn{'s' if third else ''} around and then {way}"
+    return f"{found['joint']}{in_form_of(found['s'] or '', 'turn')} around and then {way}"
 
 
 def _does(found: re.Match[str]) -> str:

@@ -9,6 +9,8 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
+from marey.vocabulary.inflection import in_form_of
+
 WHO = r"(?:he|she|they|it|(?:the|a|an|his|her|their|our|my) (?:[\w-]+ ){0,2}?[\w-]+)"
 """Words of who does something."""
 _ENDS = r"(?P<end>[.!]?)$"
@@ -78,6 +80,4 @@ def told_in_order(prompt: str, does: Callable[[str], str | None]) -> str:
 
 
 def _sits_and(found: re.Match[str]) -> str:
-    verb = found["does"]
-    third = found["verb"].lower().endswith("s")
-    return f"{found['sits']}, then {verb + ('es' if verb.endswith(('s', 'ch')) else 's') if third else verb}"
+    return f"{found['sits']}, then {in_form_of(found['verb'], found['does'])}"

@@ -41,7 +41,7 @@ _RUNS_AND_TURNS = re.compile(
 """A run with a turn to a side, of which models read a run ahead."""
 _STEPS_ON = re.compile(
     rf"""\b(?P<turn>turn(?:s|ing)?(?:\ (?!and\b|then\b)[\w-]+){{1,6}}?),?\ and
-    \ (?=(?:takes?|taking|walks?|walking)\ (?:another\ )?(?:{"|".join(TO_TWENTY.split())}|\d+|a\ few|several)
+    \ (?=(?:takes?|taking|walks?|walking)\ (?:another\ )?(?:{TO_TWENTY}|\d+|a\ few|several)
     (?:\ [\w-]+){{0,2}}?\ (?:steps?|strides?|paces?|met(?:er|re)s)\b)""",
     re.IGNORECASE | re.VERBOSE,
 )

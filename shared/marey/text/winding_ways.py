@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 
+from marey.vocabulary.inflection import in_form_of
+
 _GAIT = r"(?:walk|jog|run|sprint|stroll|strid|stride|march|mov|move|go|goe|rac|race|dash|hurr|trot|sneak)"
 _WINDS = r"(?:weav(?:es?|ing)|slalom(?:s|ing)?|zig[ -]?zag(?:s|ging)?|swerv(?:es?|ing)|snak(?:es?|ing))"
 _WHERE = (
@@ -53,6 +55,4 @@ def with_plain_zigzag(prompt: str) -> str:
 def _goes(found: re.Match[str]) -> str:
     """Return words of a way for those of who winds."""
     word, fast = found["winds"].lower(), bool(found["fast"] or _FAST.search(found.string))
-    base, ending = ("run", "ning") if fast else ("walk", "ing")
-    goes = base + (ending if word.endswith("ing") else "s" if word.endswith("s") else "")
-    return f"{goes} in a zigzag pattern"
+    return f"{in_form_of(word, 'run' if fast else 'walk')} in a zigzag pattern"

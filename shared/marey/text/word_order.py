@@ -9,7 +9,7 @@ from marey.vocabulary.lengths import TO_TWENTY
 
 _HOPS = re.compile(
     rf"""(?P<hops>\b(?:hop|jump|bounce)(?:s|p?ing|p?ed)?(?:\ \w+ly)?(?:\ (?:forwards?|ahead|across|along))?),?
-    \ (?P<often>once|twice|thrice|(?:{"|".join(TO_TWENTY.split())}|\d{{1,2}}|several|a\ few)\ times),?
+    \ (?P<often>once|twice|thrice|(?:{TO_TWENTY}|\d{{1,2}}|several|a\ few)\ times),?
     \ (?P<foot>on\ (?:only\ |just\ )?(?:one|(?:(?:the|his|her|their|your|my|its)\ )?(?:left|right))\ (?:foot|leg))\b""",
     re.IGNORECASE | re.VERBOSE,
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import re
+from marey.vocabulary import inflection
 
 EDGE_PUNCTUATION = ".,;:!?\"'()[]…"
 """Punctuation stripped from the ends of words and of nodes' texts."""
@@ -143,13 +143,7 @@ def _restore(stem: str) -> str:
 
 def third_person(base: str) -> str:
     """walk → walks, carry → carries, punch → punches."""
-    if base == "be":
-        return "is"
-    if base == "have":
-        return "has"
-    if re.search(r"[^aeiou]y$", base):
-        return base[:-1] + "ies"
-    return base + ("es" if base.endswith(("ch", "sh", "s", "x", "z", "o")) else "s")
+    return {"be": "is", "have": "has"}.get(base) or inflection.third_person(base)
 
 
 def inflected(word: str) -> str:

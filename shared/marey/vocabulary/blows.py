@@ -21,9 +21,9 @@ KINDS = {
 _SIDED = r"(?= (?:left|right)(?: hand)?(?:$|[,.;]| (?:and|then|to|at)\b))"
 _ONLY_BEFORE = {"overhand": r"(?= (?:left|right|punch|blow)|[,.;]|$)", "straight": _SIDED}
 """Words behind one that is no punch elsewhere: "throws overhand", "walks straight"."""
-NUMBERS = {"a": 1, "an": 1, "one": 1, "two": 2, "double": 2, "couple of": 2, "three": 3, "triple": 3, "four": 4}
+_NUMBERS = {"a": 1, "an": 1, "one": 1, "two": 2, "double": 2, "couple of": 2, "three": 3, "triple": 3, "four": 4}
 """Words of numbers of punches."""
-_NUMBER = rf"(?P<number>\d|{'|'.join(NUMBERS)})"
+_NUMBER = rf"(?P<number>\d|{'|'.join(_NUMBERS)})"
 _HEAVY = r"heavy|hard|strong|powerful|big|huge|mighty|massive|brutal|devastating|crushing|wide"
 _LIGHT = r"light|quick|rapid|fast|sharp|snappy|short|tight|soft"
 _HASTE = rf"(?:(?:{_HEAVY}|{_LIGHT}|more|slow|clean|solid|final|single|straight|lead|rear|long|boxing|body),? )*"
@@ -96,4 +96,4 @@ def _weight(words: str) -> str:
 def _value(word: str | None) -> int | None:
     if not word:
         return None
-    return int(word) if word.isdecimal() else NUMBERS.get(word)
+    return int(word) if word.isdecimal() else _NUMBERS.get(word)

@@ -11,12 +11,13 @@ from itertools import pairwise
 from marey.vocabulary.blows import stated_blows
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.inflection import noun_forms
-from marey.vocabulary.lengths import TO_TWENTY
+from marey.vocabulary.lengths import NUMBERS
 from marey.vocabulary.word_lists import load_word_lists
 
 MOST = 20
 """More repetitions than these are not read."""
-_NUMBERS = {word: number for number, word in enumerate(TO_TWENTY.split(), 1)} | {
+_NUMBERS = {
+    **NUMBERS,
     "single": 1,
     "double": 2,
     "couple": 2,

@@ -17,7 +17,9 @@ SIZES = {"tight": (1.0, 1.4), "": (1.6, 2.4), "wide": (3.0, 3.6)}
 LEAST_ACROSS, MOST_ACROSS = 0.8, 12.0
 """Metres of circles whose size is read."""
 
-WAYS = frozenset({"walk", "run", "sprint"})
+RUNS = frozenset({"run", "sprint"})
+"""Actions that are runs."""
+WAYS = RUNS | {"walk"}
 """Actions that are bent to a course."""
 _CIRCLING = WAYS | {"turn", "turn-around"}
 _GAITS = (

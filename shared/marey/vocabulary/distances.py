@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from marey.vocabulary.lengths import TO_TWENTY
+from marey.vocabulary.lengths import NUMBERS
 
 GOING = frozenset({"walk", "walk-backward", "run", "sprint", "sneak", "sidestep", "crawl", "carry"})
 """Actions of a body that goes somewhere."""
@@ -13,7 +13,7 @@ METRES = {"m": 1.0, "f": 0.3048, "y": 0.9144, "s": 0.62, "p": 0.7}
 LEAST, MOST = 0.3, 60.0
 """Metres that are read."""
 _NUMBERS = {
-    **{name: float(value) for value, name in enumerate(TO_TWENTY.split(), 1)},
+    **{word: float(number) for word, number in NUMBERS.items()},
     "thirty": 30.0,
     "forty": 40.0,
     "fifty": 50.0,

@@ -176,3 +176,9 @@ def in_form_of(said: str, verb: str) -> str:
     """Return a verb in the form of another one, or of its ending: in -ing, in the third person, or as it is."""
     end = said.lower()
     return gerund(verb) if end.endswith("ing") else third_person(verb) if end.endswith("s") else verb
+
+
+def in_present_form_of(said: str, verb: str) -> str:
+    """Return a verb in the form of another one, or of its ending; of a past one in the third person: "sits" for
+    "slumped", "falls" for "lost"."""
+    return in_form_of("s" if said.lower().endswith(("d", "t")) else said, verb)

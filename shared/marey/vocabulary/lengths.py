@@ -6,7 +6,7 @@ Standard library only. A bundle's range of lengths is not known here (`marey.bun
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
@@ -16,13 +16,14 @@ from marey.vocabulary.held_poses import without_held_pose
 from marey.vocabulary.inflection import third_person
 from marey.vocabulary.word_lists import load_word_lists
 
-TO_TWENTY = """one two three four five six seven eight nine ten eleven twelve thirteen fourteen fifteen sixteen
+_TO_TWENTY = """one two three four five six seven eight nine ten eleven twelve thirteen fourteen fifteen sixteen
 seventeen eighteen nineteen twenty"""
-"""The numbers from 1 on in words, with blanks between them."""
-TO_TEN = "|".join(TO_TWENTY.split()[:10])
-"""Words of the numbers from 1 to 10, for patterns."""
+NUMBERS: Mapping[str, int] = {word: number for number, word in enumerate(_TO_TWENTY.split(), 1)}
+"""The numbers from 1 to 20, by their words."""
+TO_TEN, TO_TWELVE, TO_TWENTY = ("|".join([*NUMBERS][:last]) for last in (10, 12, 20))
+"""Words of the numbers from 1 on, for patterns."""
 _NUMBERS = {
-    **{name: float(value) for value, name in enumerate(TO_TWENTY.split(), 1)},
+    **{word: float(number) for word, number in NUMBERS.items()},
     "thirty": 30.0,
     "forty": 40.0,
     "fifty": 50.0,
@@ -62,7 +63,7 @@ _CLAUSE_BEFORE = re.compile(r"[^\W\d_]{3}.*\bfor\s+(?:(?:about|around|exactly|ro
 _OWN_BEFORE = re.compile(r"(?<!\bfor)(?<!\bin)(?<!\babout)(?<!\bof)(?<=[^\W\d_]{2})\s*$")
 """A clause whose length stands behind it: "balances 2 s, jumps"."""
 _DECADE = re.compile(r"[5-9]0s")
-_SECONDS = rf"(?:\d{{1,3}}(?:[.,]\d+)?|{'|'.join(TO_TWENTY.split())})[ -]?(?:seconds?|secs?|s)\b"
+_SECONDS = rf"(?:\d{{1,3}}(?:[.,]\d+)?|{TO_TWENTY})[ -]?(?:seconds?|secs?|s)\b"
 _SO_LONG = (
     r"(?:(?:to|at|about|around|exactly|roughly|only|just|max(?:imum)?|no[ ](?:more|longer)[ ]than|up[ ]to)\b\.?[ ]?)*"
 )

@@ -5,10 +5,10 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
-from importlib.metadata import version
 
 from standardwebhooks.webhooks import Webhook
 
+from marey.core.package import own_version
 from marey.webhooks.types import DueDelivery
 
 NOUNS = {
@@ -35,7 +35,7 @@ def headers_of(due: DueDelivery, body: bytes, secrets: Sequence[str], now: datet
     identifier = str(due.event)
     return {
         "content-type": "application/json",
-        "user-agent": f"Marey/{version('marey')}",
+        "user-agent": f"Marey/{own_version()}",
         "webhook-id": identifier,
         "webhook-timestamp": str(int(at.timestamp())),
         "webhook-signature": " ".join(Webhook(each).sign(identifier, at, body.decode()) for each in secrets),

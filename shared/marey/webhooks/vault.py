@@ -8,7 +8,6 @@ nothing.
 from __future__ import annotations
 
 import base64
-import os
 import secrets
 from pathlib import Path
 
@@ -16,6 +15,7 @@ from cryptography.fernet import Fernet, InvalidToken, MultiFernet
 
 from marey.core.errors import InvalidInput, Refused
 from marey.core.settings import Settings
+from marey.core.whole_files import whole_file
 
 KEY_FILE = "webhook.key"
 WHERE = "MAREY_WEBHOOK_KEY"
@@ -79,12 +79,7 @@ def new_signing_secret() -> str:
 def key_file(folder: Path) -> Path:
     """Return the file with this folder's key, readable by its owner alone; create it if missing."""
     path = folder / KEY_FILE
-    temporary = path.with_suffix(".key.part")
     if not path.exists():
-        descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
-        with os.fdopen(descriptor, "wb") as stream:
-            stream.write(Fernet.generate_key() + b"\n")
-            stream.flush()
-            os.fsync(stream.fileno())
-        temporary.replace(path)
+        with whole_file(path, private=True, durable=True) as part:
+            part.write_bytes(Fernet.generate_key() + b"\n")
     return path

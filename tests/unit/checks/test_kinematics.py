@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from marey.checks.kinematics import gait, hand, heading, lean, smooth, turning_points
+from marey.checks.kinematics import gait, hand, heading, lean, turning_points
 from marey.checks.quality import quality
 from marey.motion.feet import runs
+from marey.motion.filters import smooth_seconds
 from tests.support.bodies import FPS, Body, bower, raiser, runner, steady, walker, waver
 
 
@@ -78,7 +79,15 @@ def test_a_sine_of_n_periods_has_two_n_half_swings_and_small_ones_do_not_count(p
 
 def test_smoothing_keeps_a_constant_and_the_shape():
     values = np.full((30, 22, 3), 4.0)
-    np.testing.assert_allclose(smooth(values, 0.3, FPS), values)
+    np.testing.assert_allclose(smooth_seconds(values, 0.3, FPS), values)
+
+
+def test_smoothing_is_by_seconds_and_not_by_frames():
+    slow, quick = (np.sin(np.linspace(0.0, 6.0, count)) for count in (121, 241))
+    at_20, at_40 = smooth_seconds(slow, 0.2, 20.0), smooth_seconds(quick, 0.2, 40.0)
+    np.testing.assert_allclose(at_40[::2], at_20, atol=0.01)
+    assert np.abs(at_20 - slow).max() > 0.01
+    np.testing.assert_array_equal(smooth_seconds(slow, 0.01, 20.0), slow)
 
 
 def test_quality_measures_skate_bones_floor_and_jerk():

@@ -34,6 +34,10 @@ def contacts_of(joints: Array) -> NDArray[np.bool_]:
     return carrying_contacts(joints, HUMANML3D, FPS, rule=rule_for(joints, FPS))
 
 
+def going(joints: Array) -> NDArray[np.bool_]:
+    return running_frames(joints, HUMANML3D, FPS)
+
+
 def falls(joints: Array, contacts: NDArray[np.bool_]) -> Array:
     """Accelerations of the pelvis in the frames of flights that are between steps, metres a second squared."""
     flies = np.zeros(len(joints), bool)
@@ -45,7 +49,7 @@ def falls(joints: Array, contacts: NDArray[np.bool_]) -> Array:
 def test_feet_that_are_clearly_slower_than_a_running_body_carry_it() -> None:
     joints = sliding(1.7, sprinter())
     known = contacts_of(joints)
-    steps = with_running_steps(joints, known, HUMANML3D, FPS)
+    steps = with_running_steps(joints, known, going(joints), HUMANML3D, FPS)
     assert steps[known].all()
     counted = [sum(len(runs(each[:, toe])) for toe in (1, 3)) for each in (known, steps)]
     assert counted[1] >= 9 > counted[0]
@@ -58,18 +62,18 @@ def test_feet_that_are_clearly_slower_than_a_running_body_carry_it() -> None:
 def test_a_body_that_walks_is_left() -> None:
     joints = np.asarray(walker(4.0), np.float64)
     known = contacts_of(joints)
-    assert not running_frames(joints, HUMANML3D, FPS).any()
-    assert not running_frames(joints[:2], HUMANML3D, FPS).any()
-    np.testing.assert_array_equal(with_running_steps(joints, known, HUMANML3D, FPS), known)
-    assert on_its_steps(joints, HUMANML3D, FPS) is joints
-    assert with_flights(joints, known, HUMANML3D, FPS) is joints
+    assert not going(joints).any()
+    assert not going(joints[:2]).any()
+    np.testing.assert_array_equal(with_running_steps(joints, known, going(joints), HUMANML3D, FPS), known)
+    assert on_its_steps(joints, going(joints), HUMANML3D, FPS) is joints
+    assert with_flights(joints, known, going(joints), HUMANML3D, FPS) is joints
 
 
 @pytest.mark.parametrize("cadence", [2.6, 3.2])
 def test_a_body_falls_in_the_flights_of_a_run(cadence: float) -> None:
     joints = sliding(1.0, Body(4.0, speed=steady(2.6), duty=0.3, cadence=cadence).joints())
-    contacts = with_running_steps(joints, contacts_of(joints), HUMANML3D, FPS)
-    moved = with_flights(joints, contacts, HUMANML3D, FPS)
+    contacts = with_running_steps(joints, contacts_of(joints), going(joints), HUMANML3D, FPS)
+    moved = with_flights(joints, contacts, going(joints), HUMANML3D, FPS)
     assert np.abs(falls(joints, contacts)).max() < 0.1
     assert falls(moved, contacts) == pytest.approx(-GRAVITY, abs=3.5)
     assert np.abs(moved[:, 0, 1] - joints[:, 0, 1]).max() < MOST_M
@@ -88,18 +92,19 @@ def test_leaps_and_the_ends_of_a_clip_are_no_flights_of_a_run() -> None:
     contacts = contacts_of(joints)
     contacts[20:40] = False
     contacts[:6] = contacts[-6:] = False
-    moved = with_flights(joints, contacts, HUMANML3D, FPS)
+    moved = with_flights(joints, contacts, going(joints), HUMANML3D, FPS)
     np.testing.assert_allclose(moved[25:35], joints[25:35], atol=0.01)
 
 
 def test_a_run_that_drifts_up_comes_down_to_its_steps() -> None:
     joints = np.asarray(runner(4.0), np.float64)
     joints[30:50, :, 1] += 0.06
-    down = on_its_steps(joints, HUMANML3D, FPS)
+    down = on_its_steps(joints, going(joints), HUMANML3D, FPS)
     lowest = [each[33:47, [10, 11], 1].min() for each in (joints, down)]
     assert lowest[0] > 0.05
     assert lowest[1] < 0.01
     np.testing.assert_allclose(down[:20], joints[:20], atol=1e-9)
+    np.testing.assert_array_equal(going(down), going(joints))
 
 
 def test_a_finished_run_stands_on_its_steps_and_falls_between_them() -> None:

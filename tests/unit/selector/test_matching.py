@@ -12,6 +12,7 @@ from marey.motion.resample import frame_times, interpolate
 from marey.quality.record import SHOWN
 from marey.selector import RULES, Motion, WantedAction, match, wanted_of
 from marey.selector.matching import side_of
+from marey.selector.rules import is_shown
 from marey.vocabulary.entries import load_vocabulary
 from tests.support.bodies import FPS, Array, Body, bower, raiser, runner, steady, walker, waver
 
@@ -61,6 +62,15 @@ def matched(joints: Array, prompt: str, fps: float = FPS) -> float:
     steps = wanted_of([prompt])
     assert steps is not None, prompt
     return match(Motion(joints, fps), steps)
+
+
+def test_an_action_is_shown_by_its_rule_with_the_side_that_is_asked_for() -> None:
+    waves, stands = (Motion(each, FPS) for each in (waver("left"), Body(4.0).joints()))
+    assert is_shown(waves, "wave")
+    assert is_shown(waves, "wave", "left")
+    assert not is_shown(waves, "wave", "right")
+    assert not is_shown(stands, "wave")
+    assert is_shown(stands, "idle")
 
 
 @pytest.mark.parametrize("prompt", SINGLE)

@@ -28,7 +28,6 @@ from marey.text.sequence_reader import (
     _placed,
     sequence_reader,
     turned_to_carry,
-    way_to_a_stop,
 )
 from marey.vocabulary.bearing_words import as_written
 from marey.vocabulary.entries import load_vocabulary
@@ -207,23 +206,6 @@ def test_a_bundle_says_whether_its_prompts_are_read_so(reading: TextPipeline) ->
         TextSpec(movements=True)
 
 
-@pytest.mark.parametrize(
-    ("prompt", "way"),
-    [
-        ("he walks up to the door and stops", "he walks up to the door"),
-        ("jog to a stop", "jog"),
-        ("She sprints, then comes to a sudden halt.", "She sprints"),
-        ("a man walks on, stops dead", "a man walks on"),
-        ("walk until she stands still", "walk"),
-        ("he walks to the bus stop", ""),
-        ("walks on without stopping", ""),
-        ("he stops and waves", ""),
-    ],
-)
-def test_the_way_to_a_stop(prompt: str, way: str) -> None:
-    assert way_to_a_stop(prompt) == way
-
-
 def test_a_way_that_ends_with_a_stop_comes_to_rest(reading: TextPipeline) -> None:
     walks, waves = reading.features(["a person walks forward and stops", "a man waves and stops"])
     assert [each.rewritten for each in walks.movements] == [
@@ -337,12 +319,6 @@ def test_who_carries_something_back_turns_round_first(
     turned = list(turned_to_carry(ReadMovement(*each) for each in (before, movement)))
     assert [each.text for each in turned] == found
     assert found[-1] == movement[0] or turned[-1].action != "walk-backward"
-
-
-def test_a_way_to_idle_ends_with_a_stop() -> None:
-    assert way_to_a_stop("run to idle") == "run"
-    assert way_to_a_stop("walk forward to idle") == "walk forward"
-    assert not way_to_a_stop("stands idle")
 
 
 def test_a_clause_that_comes_first_in_time_is_not_at_once_with_the_one_before_it() -> None:

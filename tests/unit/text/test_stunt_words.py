@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from marey.text.stunt_words import THROWN_BACK, with_plain_stunts
+from marey.text.lost_footing import THROWN_BACK
+from marey.text.stunt_words import with_plain_stunts
 
 
 @pytest.mark.parametrize(

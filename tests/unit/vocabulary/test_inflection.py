@@ -2,7 +2,7 @@
 
 import pytest
 
-from marey.vocabulary.inflection import noun_forms, verb_forms
+from marey.vocabulary.inflection import in_form_of, in_present_form_of, noun_forms, verb_forms
 
 
 @pytest.mark.parametrize(
@@ -27,3 +27,21 @@ def test_verbs(base: str, forms: str) -> None:
 def test_nouns() -> None:
     assert noun_forms("foot") == {"foot", "feet"}
     assert noun_forms("punch") == {"punch", "punches"}
+
+
+@pytest.mark.parametrize(
+    ("said", "verb", "form", "present"),
+    [
+        ("", "sit", "sit", "sit"),
+        ("e", "fall", "fall", "fall"),
+        ("es", "fall", "falls", "falls"),
+        ("SLUMPS", "sit", "sits", "sits"),
+        ("ping", "fall", "falling", "falling"),
+        ("ting", "jog", "jogging", "jogging"),
+        ("ped", "fall", "fall", "falls"),
+        ("lost", "march", "march", "marches"),
+    ],
+)
+def test_a_verb_in_the_form_of_another_one(said: str, verb: str, form: str, present: str) -> None:
+    assert in_form_of(said, verb) == form
+    assert in_present_form_of(said, verb) == present

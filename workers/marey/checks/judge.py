@@ -13,17 +13,10 @@ from typing import Literal
 
 import numpy as np
 
-from marey.checks.kinematics import (
-    ANKLES,
-    HEAD,
-    PELVIS,
-    WRISTS,
-    Array,
-    smooth,
-    variety,
-)
+from marey.checks.kinematics import ANKLES, HEAD, PELVIS, WRISTS, Array, variety
 from marey.checks.stretch import Arm, Stretch
 from marey.checks.strikes import is_lively, kicks, punches, slashes
+from marey.motion.filters import smooth_seconds
 
 Act = Literal["walk", "run", "walk_back", "turn", "wave", "raise", "bow", "kick", "punch", "slash", "dance"]
 Side = Literal["", "left", "right", "both"]
@@ -146,7 +139,7 @@ def _bow(m: Stretch, want: Expectation) -> str:
         return f"leans forward by {m.bend:.0f} degrees"
     if m.gait.path > 0.2 * m.seconds + 0.4:
         return f"walks {m.gait.path:.1f} m meanwhile"
-    head = smooth(m.joints[:, HEAD, 1], 0.1, m.fps)
+    head = smooth_seconds(m.joints[:, HEAD, 1], 0.1, m.fps)
     return "" if np.percentile(head, 95) - head.min() > 0.05 else "the head does not go down"
 
 
@@ -263,7 +256,7 @@ class Straightness:
 
 def straightness(joints: Array, fps: float) -> Straightness:
     """Measure the path of the pelvis over the floor, without its sway."""
-    way = smooth(np.asarray(joints, np.float64)[:, PELVIS], 0.4, fps)[:, [0, 2]]
+    way = smooth_seconds(np.asarray(joints, np.float64)[:, PELVIS], 0.4, fps)[:, [0, 2]]
     chord = way[-1] - way[0]
     length = float(np.linalg.norm(chord))
     if length < 1e-6:

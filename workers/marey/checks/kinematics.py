@@ -12,26 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.motion.feet import runs
+from marey.motion.filters import smooth_seconds
 
 Array = NDArray[np.floating]
 
 PELVIS, NECK, HEAD = 0, 12, 15
 HIPS, SHOULDERS, ELBOWS, WRISTS = (1, 2), (16, 17), (18, 19), (20, 21)  # left, right
 KNEES, ANKLES, TOES = (4, 5), (7, 8), (10, 11)
-
-
-def smooth(values: Array, seconds: float, fps: float) -> Array:
-    """Gaussian filter along axis 0 with a standard deviation of `seconds`, ends repeated."""
-    sigma = seconds * fps
-    if sigma < 0.3 or len(values) < 2:
-        return np.asarray(values, np.float64)
-    radius = int(np.ceil(3 * sigma))
-    kernel = np.exp(-0.5 * (np.arange(-radius, radius + 1) / sigma) ** 2)
-    kernel /= kernel.sum()
-    flat = np.asarray(values, np.float64).reshape(len(values), -1)
-    padded = np.pad(flat, ((radius, radius), (0, 0)), mode="edge")
-    columns = [np.convolve(padded[:, c], kernel, mode="valid") for c in range(flat.shape[1])]
-    return np.stack(columns, axis=1).reshape(np.shape(values)).astype(np.float64)
 
 
 def velocity(points: Array, fps: float) -> Array:
@@ -45,10 +32,10 @@ def heading(joints: Array, fps: float) -> Array:
     0 is +Z; positive is to the left (+X).
     """
     across = joints[:, HIPS[0]] - joints[:, HIPS[1]] + joints[:, SHOULDERS[0]] - joints[:, SHOULDERS[1]]
-    flat = smooth(across[:, [0, 2]], 0.15, fps)
+    flat = smooth_seconds(across[:, [0, 2]], 0.15, fps)
     # forward = across x up = (-across_z, across_x) in (x, z)
     angle = np.unwrap(np.arctan2(-flat[:, 1], flat[:, 0]))
-    return np.degrees(smooth(angle, 0.3, fps))
+    return np.degrees(smooth_seconds(angle, 0.3, fps))
 
 
 def body_frame(vectors: Array, heading_degrees: Array) -> tuple[Array, Array]:
@@ -107,7 +94,7 @@ def gait(joints: Array, fps: float) -> GaitMeasures:
     """Measure the travel of a motion (T, 22, 3)."""
     joints = np.asarray(joints, np.float64)
     angle = heading(joints, fps)
-    pelvis = smooth(joints[:, PELVIS], 0.1, fps)
+    pelvis = smooth_seconds(joints[:, PELVIS], 0.1, fps)
     flow = np.diff(pelvis, axis=0)
     along, sideways = body_frame(flow, (angle[:-1] + angle[1:]) / 2)
     forward, left = body_frame(pelvis[-1] - pelvis[0], angle[0])
@@ -133,7 +120,7 @@ def footfalls(joints: Array, fps: float) -> list[int]:
     """Frames at which a foot is set on the floor after a swing of at least 12 cm and 0.1 s."""
     falls = []
     for foot in zip(ANKLES, TOES, strict=True):
-        point = smooth(joints[:, foot].mean(axis=1), 0.04, fps)
+        point = smooth_seconds(joints[:, foot].mean(axis=1), 0.04, fps)
         speed = np.linalg.norm(velocity(point, fps)[:, [0, 2]], axis=-1)
         threshold = max(0.35, 0.35 * float(np.percentile(speed, 90)))
         for a, b in runs(speed > threshold):
@@ -178,7 +165,7 @@ def hand(joints: Array, fps: float, side: int) -> Hand:
     wrist, shoulder = joints[:, WRISTS[side]], joints[:, SHOULDERS[side]]
     up = trunk_up(joints)
     over = np.einsum("ti,ti->t", wrist - joints[:, SHOULDERS[0]] / 2 - joints[:, SHOULDERS[1]] / 2, up)
-    over = smooth(over, 0.05, fps)
+    over = smooth_seconds(over, 0.05, fps)
     raised = over > -0.12
     stretches = runs(raised)
     longest = max(stretches, key=lambda ab: ab[1] - ab[0], default=(0, 0))
@@ -206,9 +193,9 @@ def _swings(joints: Array, wrist: Array, shoulder: Array, raised: NDArray[np.boo
     for a, b in runs(raised):
         if b - a < 0.3 * fps:
             continue
-        part = local[a:b] - smooth(local[a:b], 0.6, fps)
+        part = local[a:b] - smooth_seconds(local[a:b], 0.6, fps)
         _, _, axes = np.linalg.svd(part - part.mean(axis=0), full_matrices=False)
-        best = max(best, turning_points(smooth(local[a:b] @ axes[0], 0.03, fps), 0.07))
+        best = max(best, turning_points(smooth_seconds(local[a:b] @ axes[0], 0.03, fps), 0.07))
     return best
 
 
@@ -234,6 +221,6 @@ def turning_points(values: Array, least: float) -> int:
 
 def lean(joints: Array, fps: float) -> Array:
     """(T,) degrees by which the trunk leans forward (negative: backward), in the body's own heading."""
-    up = smooth(trunk_up(np.asarray(joints, np.float64)), 0.08, fps)
+    up = smooth_seconds(trunk_up(np.asarray(joints, np.float64)), 0.08, fps)
     forward, _ = body_frame(up, heading(joints, fps))
     return np.degrees(np.arctan2(forward, up[:, 1]))

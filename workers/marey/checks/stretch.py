@@ -20,11 +20,11 @@ from marey.checks.kinematics import (
     heading,
     lean,
     runs,
-    smooth,
     trunk_up,
     turning_points,
     velocity,
 )
+from marey.motion.filters import smooth_seconds
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ class Stretch:
     @cached_property
     def along(self) -> Array:
         """(T,) speed in the direction the body faces, metres a second, smoothed over a step."""
-        pelvis = smooth(self.joints[:, PELVIS], 0.25, self.fps)
+        pelvis = smooth_seconds(self.joints[:, PELVIS], 0.25, self.fps)
         return body_frame(velocity(pelvis, self.fps), self.heading)[0]
 
     @cached_property
@@ -107,7 +107,7 @@ class Stretch:
     def bend(self) -> float:
         """Deepest forward lean over the upright one, degrees, that is held by standing legs."""
         angle = lean(self.joints, self.fps)
-        standing = np.abs(smooth(self.along, 0.1, self.fps)) < 0.35
+        standing = np.abs(smooth_seconds(self.along, 0.1, self.fps)) < 0.35
         return float(angle[standing].max() - np.percentile(angle, 20)) if standing.any() else 0.0
 
     def over(self, side: int) -> Array:
@@ -122,7 +122,7 @@ class Stretch:
 def wrist_height(joints: Array, fps: float, side: int) -> Array:
     """(T,) height of a wrist over the middle of the shoulders along the trunk, metres."""
     middle = (joints[:, SHOULDERS[0]] + joints[:, SHOULDERS[1]]) / 2
-    return smooth(np.einsum("ti,ti->t", joints[:, WRISTS[side]] - middle, trunk_up(joints)), 0.05, fps)
+    return smooth_seconds(np.einsum("ti,ti->t", joints[:, WRISTS[side]] - middle, trunk_up(joints)), 0.05, fps)
 
 
 def arm(joints: Array, angle: Array, fps: float, side: int) -> Arm:
@@ -144,7 +144,7 @@ def arm(joints: Array, angle: Array, fps: float, side: int) -> Arm:
     local = np.stack([*body_frame(wrist - joints[:, SHOULDERS[side]], angle), wrist[:, 1]], axis=-1)
     swings = flutter = 0
     for a, b in runs(hold):
-        moved = local - smooth(local, 0.5, fps)
+        moved = local - smooth_seconds(local, 0.5, fps)
         swings = max(swings, _swings(moved[a:b], 0.3, 0.03, fps))
         flutter = max(flutter, _swings(moved[a:b], 0.4, 0.01, fps))
     return Arm(float(over.max()), float(np.ptp(over)), float(lifted.sum() / fps), swings, flutter)

@@ -4,19 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from marey.checks.kinematics import (
-    ANKLES,
-    HEAD,
-    PELVIS,
-    SHOULDERS,
-    WRISTS,
-    Array,
-    body_frame,
-    heading,
-    smooth,
-    velocity,
-)
+from marey.checks.kinematics import ANKLES, HEAD, PELVIS, SHOULDERS, WRISTS, Array, body_frame, heading, velocity
 from marey.motion.feet import runs
+from marey.motion.filters import smooth_seconds
 
 Interval = tuple[int, int]
 
@@ -37,7 +27,7 @@ def punches(joints: Array, fps: float) -> list[Interval]:
     angle = heading(joints, fps)
     out: list[Interval] = []
     for wrist, shoulder in zip(WRISTS, SHOULDERS, strict=True):
-        reach = smooth(joints[:, wrist] - joints[:, shoulder], 0.03, fps)
+        reach = smooth_seconds(joints[:, wrist] - joints[:, shoulder], 0.03, fps)
         forward, _ = body_frame(reach, angle)
         speed = velocity(forward, fps)
         level = (np.abs(reach[:, 1]) < 0.3) & (np.abs(velocity(reach[:, 1], fps)) < 0.6 * speed)
@@ -49,9 +39,9 @@ def punches(joints: Array, fps: float) -> list[Interval]:
 def slashes(joints: Array, fps: float) -> list[Interval]:
     """Slashes: from both hands together over the head to their fast way down, at 1.2 m/s or more."""
     hands = joints[:, list(WRISTS)].mean(axis=1)
-    over = smooth(hands[:, 1] - joints[:, HEAD, 1], 0.03, fps)
+    over = smooth_seconds(hands[:, 1] - joints[:, HEAD, 1], 0.03, fps)
     apart = np.linalg.norm(joints[:, WRISTS[0]] - joints[:, WRISTS[1]], axis=-1)
-    down = velocity(smooth(hands[:, 1], 0.03, fps), fps) < -1.2
+    down = velocity(smooth_seconds(hands[:, 1], 0.03, fps), fps) < -1.2
     window = round(0.6 * fps)
     out: list[Interval] = []
     for a, b in runs((over > -0.05) & (apart < 0.2)):
@@ -64,7 +54,7 @@ def slashes(joints: Array, fps: float) -> list[Interval]:
 def liveliness(joints: Array, fps: float) -> Array:
     """(T,) mean speed of the joints relative to the pelvis, metres a second, smoothed over half a second."""
     local = joints - joints[:, :1]
-    return smooth(np.linalg.norm(velocity(local, fps), axis=-1).mean(axis=1), 0.5, fps)
+    return smooth_seconds(np.linalg.norm(velocity(local, fps), axis=-1).mean(axis=1), 0.5, fps)
 
 
 def is_lively(joints: Array, fps: float) -> bool:

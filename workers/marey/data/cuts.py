@@ -7,10 +7,11 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.checks.kinematics import heading, lean, smooth, trunk_up
+from marey.checks.kinematics import heading, lean, trunk_up
 from marey.data.describe import CYCLIC
 from marey.data.part import FPS, Part
 from marey.data.splice import seam_costs, seam_features
+from marey.motion.filters import smooth_seconds
 
 Array = NDArray[np.floating]
 WORST_SEAM = 0.6
@@ -49,7 +50,7 @@ def arm_level(joints: Array, side: str) -> Array:
     """Relative height (T,) of the raised hand: 0 at its lowest in the clip, 1 at its highest."""
     wrists = [20 + k for k in _ARMS[side]]
     over = np.einsum("tki,ti->tk", joints[:, wrists] - joints[:, :1], trunk_up(joints)).mean(axis=1)
-    over = smooth(over, 0.05, FPS)
+    over = smooth_seconds(over, 0.05, FPS)
     return (over - over.min()) / max(float(np.ptp(over)), 1e-6)
 
 

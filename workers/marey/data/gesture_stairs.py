@@ -7,11 +7,11 @@ import random
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.checks.kinematics import smooth
 from marey.data.gesture_idles import is_plain_idle, of_length
 from marey.data.part import FPS, Part
 from marey.drawing.footsteps import Footstep, Manner, stepped
 from marey.drawing.gesture import Gesture
+from marey.motion.filters import smooth_seconds
 from marey.posing.standing import ARMS, LEFT, RIGHT, StandingBody, eased
 
 Array = NDArray[np.floating]
@@ -92,7 +92,7 @@ def _swing_arms(body: StandingBody, steps: list[Footstep], degrees: float) -> No
     for step in steps:
         share = np.clip((t - step.start) / step.seconds, 0.0, 1.0)
         phase += (1 if step.foot == 0 else -1) * np.sin(np.pi * share) * np.sign(step.forward)
-    phase = smooth(phase, 0.12, FPS)
+    phase = smooth_seconds(phase, 0.12, FPS)
     for side, sign in ((LEFT, 1.0), (RIGHT, -1.0)):
         _, shoulder, elbow, _ = ARMS[side]
         swung = sign * degrees * phase

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.checks.kinematics import smooth
 from marey.data.part import FPS
 from marey.drawing.placed import about_vertical, posed, spine_yaw
+from marey.motion.filters import smooth_seconds
 from marey.motion.rotations import from_rotvec, rotate
 from marey.posing.limbs import CARRIED, GRAVITY
 from marey.posing.standing import eased
@@ -90,7 +90,7 @@ def _bank(root: Array, turn: Array) -> Array:
         return np.zeros(len(turn))
     speed = np.linalg.norm(np.gradient(root[:, [0, 2]], axis=0), axis=-1) * FPS
     pull = speed * np.gradient(turn) * FPS
-    return smooth(_BANK * np.arctan(pull / GRAVITY), 0.2, FPS)
+    return smooth_seconds(_BANK * np.arctan(pull / GRAVITY), 0.2, FPS)
 
 
 def _tilted(local: Array, bank: Array) -> Array:

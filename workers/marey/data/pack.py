@@ -19,6 +19,7 @@ from marey.core.arrays import check_array, read_npz, text_of
 from marey.core.documents import parse_json
 from marey.core.errors import InvalidFile, InvalidInput, NotFound
 from marey.core.validation import first_problem
+from marey.core.whole_files import whole_file
 from marey.data.licences import Terms
 
 MAX_BYTES = 8 * 2**30
@@ -119,10 +120,8 @@ class JointsPack:
         terms, clips = ([asdict(entry) for entry in entries] for entries in (self.terms, self.clips))
         about = {"left_out": self.left_out, "caption_files": self.caption_files}
         table = json.dumps({"format": FORMAT, "terms": terms, **about, "clips": clips})
-        temporary = path.with_name(path.name + ".part")
-        with temporary.open("wb") as file:
+        with whole_file(path, alone=True) as part, part.open("wb") as file:
             np.savez_compressed(file, local=self.local, root=self.root, table=np.array(table))
-        temporary.replace(path)
 
     @classmethod
     def load(cls, path: Path) -> JointsPack:

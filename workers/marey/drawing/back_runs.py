@@ -10,10 +10,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.checks.kinematics import smooth
 from marey.drawing.footsteps import Footstep, Manner, stepped
 from marey.drawing.gesture import SIDES, Gesture
 from marey.drawing.in_place import FORMS, swing_running_arm
+from marey.motion.filters import smooth_seconds
 from marey.posing.limbs import FPS
 from marey.posing.standing import SIGN, StandingBody, eased
 
@@ -100,7 +100,7 @@ def _flies(steps: Sequence[Footstep], time: Array) -> Array:
         ends = before.start + before.seconds
         share = np.clip((time - after.start) / max(ends - after.start, 1e-6), 0.0, 1.0)
         found += 4 * share * (1 - share)
-    return smooth(np.clip(found, 0.0, 1.0), 0.03, FPS)
+    return smooth_seconds(np.clip(found, 0.0, 1.0), 0.03, FPS)
 
 
 def back_steps_in(seconds: float, form: str, pace: str, waits: Sequence[float]) -> int:

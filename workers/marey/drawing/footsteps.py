@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.checks.kinematics import heading, smooth
+from marey.checks.kinematics import heading
 from marey.drawing.gesture import SIDES
 from marey.drawing.placed import about_vertical, posed, spine_yaw
-from marey.motion.filters import smooth_above
+from marey.motion.filters import smooth_above, smooth_seconds
 from marey.motion.rotations import from_rotvec, rotate
 from marey.posing.limbs import FPS, LEG_CHAINS, LEVEL
 from marey.posing.standing import ARMS, SIGN, StandingBody, eased
@@ -90,7 +90,7 @@ def stepped(joints: Array, steps: Sequence[Footstep], manner: Manner, follows: f
         places[:, step.foot] += went * (target - places[-1, step.foot])
         lifted[:, step.foot] += np.sin(np.pi * _risen(np.clip((share - 0.08) / 0.92, 0, 1), manner.peak)) ** 2
         swings[:, step.foot] += np.sin(np.pi * share**0.6) ** 2
-    body = smooth(places.mean(1), follows, FPS)
+    body = smooth_seconds(places.mean(1), follows, FPS)
     for side, (_, _, ankle, toe) in enumerate(LEG_CHAINS):
         pitch = np.zeros((len(local), 3))
         pitch[:, 0] = np.radians(manner.heel) * swings[:, side]
@@ -99,8 +99,8 @@ def stepped(joints: Array, steps: Sequence[Footstep], manner: Manner, follows: f
     toes = about_vertical(feet, places[..., 3]) + places[..., :3]
     toes[..., 1] += manner.lift * lifted
     toes += about_vertical(np.array([0.0, 0.0, manner.throw]) * lifted[..., None], places[..., 3])
-    weight = smooth((lifted[:, 1] - lifted[:, 0]) * manner.sway, 0.1, FPS)
-    dip = smooth(lifted.max(1) * 0.25 * manner.sway, 0.1, FPS)
+    weight = smooth_seconds((lifted[:, 1] - lifted[:, 0]) * manner.sway, 0.1, FPS)
+    dip = smooth_seconds(lifted.max(1) * 0.25 * manner.sway, 0.1, FPS)
     root = about_vertical(local[:, 0] + np.stack([weight, -dip, 0 * dip], axis=-1), body[:, 3]) + body[:, :3]
     shoulders = np.interp(frames + manner.look * FPS, frames, body[:, 3])
     yaw = spine_yaw(body[:, 3], shoulders)
@@ -141,7 +141,7 @@ def swing_arms_with(body: StandingBody, steps: Sequence[Footstep], degrees: floa
     for number, step in enumerate(steps):
         target = SIGN[SIDES[step.foot]] if number < len(steps) - 1 else 0.0
         phase += eased(np.clip((time - step.start) / step.seconds, 0.0, 1.0)) * (target - phase[-1])
-    phase = smooth(phase, 0.1, FPS)
+    phase = smooth_seconds(phase, 0.1, FPS)
     for side in SIDES:
         _, shoulder, elbow, _ = ARMS[side]
         swung = SIGN[side] * degrees * phase

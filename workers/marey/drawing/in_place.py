@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.checks.kinematics import smooth
 from marey.drawing.gesture import SIDES, Gesture
+from marey.motion.filters import smooth_seconds
 from marey.posing.limbs import BONE_LENGTHS, FPS
 from marey.posing.standing import LEGS, OTHER_SIDE, SIGN, StandingBody, eased
 
@@ -134,7 +134,7 @@ def _move_trunk(body: StandingBody, form: GaitForm, time: Array, size: Array, fi
     body.shift(
         -size * (form.sinks + form.bobs * middle),
         0.0,
-        -SIGN[first] * form.sways * smooth(size * phase, 0.04, FPS),
+        -SIGN[first] * form.sways * smooth_seconds(size * phase, 0.04, FPS),
     )
     body.lean(form.leans * size, "left")
     body.lean(SIGN[first] * form.twists * size * phase, "up")

@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.checks.kinematics import smooth
 from marey.drawing.gesture import SIDES, Gesture
 from marey.drawing.guards import drawn_stance
 from marey.drawing.stances import settle, turn_hips
+from marey.motion.filters import smooth_seconds
 from marey.motion.rotations import from_rotvec, rotate
 from marey.posing.limbs import FPS
 from marey.posing.standing import ARMS, LEFT, LEGS, OTHER_SIDE, RIGHT, SIGN, StandingBody, eased, way_through
@@ -188,18 +188,23 @@ def strike(body: StandingBody, fps: float, strikes: Sequence[tuple[float, Strike
         else:
             lifted = eased(np.minimum(since, blow.seconds - since) / 0.12)[:, None]
             elbows[side][inside] = (1 - lifted) * np.array(ELBOW) + lifted * np.array(blow.elbow)
-    twist = smooth(twist, SMOOTH_S, fps)
+    twist = smooth_seconds(twist, SMOOTH_S, fps)
     if drives:
-        ahead = smooth(np.abs(twist) / 36.0, 0.05, fps)
-        body.shift(-0.3 * STRIDE_M * ahead - smooth(sinks, SMOOTH_S, fps), STRIDE_M * ahead)
-        hips = smooth(hips, SMOOTH_S, fps)
+        ahead = smooth_seconds(np.abs(twist) / 36.0, 0.05, fps)
+        body.shift(-0.3 * STRIDE_M * ahead - smooth_seconds(sinks, SMOOTH_S, fps), STRIDE_M * ahead)
+        hips = smooth_seconds(hips, SMOOTH_S, fps)
         turn_hips(body, hips)
         for side in ARMS:
-            _pivot(body, side, smooth(pivots[side], SMOOTH_S, fps))
+            _pivot(body, side, smooth_seconds(pivots[side], SMOOTH_S, fps))
         settle(body)
     body.lean(twist - hips if drives else twist, "up")
     for side in ARMS:
-        body.hold(side, np.ones(frames), smooth(ways[side], SMOOTH_S, fps), pole=smooth(elbows[side], 0.05, fps))
+        body.hold(
+            side,
+            np.ones(frames),
+            smooth_seconds(ways[side], SMOOTH_S, fps),
+            pole=smooth_seconds(elbows[side], 0.05, fps),
+        )
 
 
 def _pivot(body: StandingBody, side: str, degrees: Array) -> None:

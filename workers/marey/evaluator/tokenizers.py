@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime
-from importlib.metadata import version
 
 import torch
 
+from marey.core.package import own_version
 from marey.data.prepared import PreparedData
 from marey.evaluations import COMPOSITIONAL, TEST_SPLIT
 from marey.evaluator.port import Evaluator
@@ -52,6 +52,6 @@ def tokenizer_report(
         judged=RECONSTRUCTION,
         heat=rebuilt.heat,
         command=f"marey train evaluator reconstruct {evaluator.name} {found.generator} DATA",
-        software={"marey": version("marey"), "torch": torch.__version__},
+        software={"marey": own_version(), "torch": torch.__version__},
         notes=tuple(f"Mean joint error on {name}: {error:.1f} mm" for name, error in found.error_mm.items()),
     )

@@ -21,7 +21,7 @@ from marey.generation.ends import SETTLING, ended
 from marey.generation.even_runs import EVEN, even_run
 from marey.generation.fine import FINE, drawn_features
 from marey.generation.flights import DANCES, JUMPS, ON_FEET, fallen, lowered, on_floor
-from marey.generation.footing import RUNS, footed
+from marey.generation.footing import RUN_SPEEDS, footed
 from marey.generation.gazing import GAZE
 from marey.generation.onward import without_return
 from marey.generation.passes import PassControl
@@ -29,7 +29,7 @@ from marey.generation.port import GenerationControl, Generator, MotionFeatures, 
 from marey.generation.pose_holds import HOLDING, with_held_pose
 from marey.generation.postured import GOING_ON, drawn_posture, gone_on, on_posture
 from marey.generation.repetitions import repeated
-from marey.generation.skidding import skidded, skids
+from marey.generation.skidding import skidded
 from marey.generation.stated import AT_PACE
 from marey.generation.steered import CLOSED, steered_features
 from marey.generation.stepped import stepped
@@ -46,13 +46,14 @@ from marey.selector.matching import ON_THE_SPOT
 from marey.selector.motion import SHORTEST, Motion
 from marey.selector.records import match_joints
 from marey.selector.repetitions import REPETITIONS, Repetition
-from marey.selector.rules import RULES
+from marey.selector.rules import is_shown
 from marey.vocabulary.bearing_words import stated_bearings
 from marey.vocabulary.counts import STEPPING
 from marey.vocabulary.courses import WAYS as STEERED
 from marey.vocabulary.courses import dribbles_ahead
 from marey.vocabulary.held_poses import held_pose
 from marey.vocabulary.scope import STANDING
+from marey.vocabulary.stops import stated_skid
 
 Float32 = NDArray[np.float32]
 
@@ -327,7 +328,7 @@ def _on_floor(
     the feet, which stays."""
     if wish.count is not None:
         return features
-    if wish.action in RUNS and (held := footed(features, layout, RUNS[wish.action])) is not None:
+    if wish.action in RUN_SPEEDS and (held := footed(features, layout, RUN_SPEEDS[wish.action])) is not None:
         features, changes["footed"] = held, True
     if wish.action in ON_FEET and (grounded := on_floor(features, layout, wish.action)) is not None:
         features, changes["grounded"] = grounded, True
@@ -381,7 +382,8 @@ def _skidded(
     features: Float32, layout: FeatureLayout, wish: Wish, request: Request, changes: dict[str, Any]
 ) -> Float32:
     """Return the motion of a run with the skid in which its prompt has it end."""
-    how = skids(request.text.said, wish.action) if request.drawing and layout.skeleton.name == HUMANML3D.name else ""
+    draws_skid = request.drawing and layout.skeleton.name == HUMANML3D.name
+    how = stated_skid(request.text.said, wish.action) if draws_skid else ""
     ends = skidded(features, layout, how, wish.seed, None if request.open else request.frames) if how else None
     changes.update({} if ends is None else {"skids": how})
     return features if ends is None else ends
@@ -433,7 +435,7 @@ def _shows(features: Float32, layout: FeatureLayout, wish: Wish, request: Reques
         return False
     motion = Motion(joints, layout.fps)
     as_often = wish.count is None or len(REPETITIONS[wish.action](motion)) == wish.count
-    return as_often and RULES[wish.action](motion, wish.side if FINE[wish.action].sided else "") >= SHOWN
+    return as_often and is_shown(motion, wish.action, wish.side if FINE[wish.action].sided else "")
 
 
 def _turn(features: Float32, layout: FeatureLayout) -> float:

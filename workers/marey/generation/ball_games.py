@@ -12,9 +12,9 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.checks.kinematics import smooth
 from marey.generation.calm import calm
 from marey.generation.fine_wish import FineWish
+from marey.motion.filters import smooth_seconds
 from marey.posing.standing import ARMS, LEFT, LEGS, OTHER_SIDE, RIGHT, SIGN, StandingBody, eased, way_through
 
 Array = NDArray[np.floating]
@@ -108,19 +108,19 @@ def kicked_ball(joints: Array, fps: float, wish: FineWish, rng: np.random.Genera
     if begun is None:
         return None
     side, body, time, times = begun
-    place = smooth(way_through(time, times, KICK_WAY), 0.035, fps)
+    place = smooth_seconds(way_through(time, times, KICK_WAY), 0.035, fps)
     turns = times[[0, 1, 3, 4]]  # it begins, is wound up, has struck, has ended
     trunk = way_through(time, turns, (0.0, 12.0, -10.0, 0.0))
     swing = way_through(time, turns, (0.0, -1.0, 1.0, 0.0))
     on = _on(time, times)
     body.shift(-0.04 * on, left=-0.06 * SIGN[side] * on)
-    body.lean(smooth(trunk, 0.05, fps), "left")
-    body.lean(smooth(SIGN[side] * 14.0 * swing, 0.05, fps), "up")
+    body.lean(smooth_seconds(trunk, 0.05, fps), "left")
+    body.lean(smooth_seconds(SIGN[side] * 14.0 * swing, 0.05, fps), "up")
     _, _, ankle, toe = LEGS[side]
     body.joints[:, [ankle, toe]] += body.world(place, side)[:, None]
     other = OTHER_SIDE[side]
     for arm, way in ((other, swing), (side, -swing)):
-        body.turn(ARMS[arm][1], "left", smooth(-38.0 * way, 0.06, fps))
+        body.turn(ARMS[arm][1], "left", smooth_seconds(-38.0 * way, 0.06, fps))
         body.lift_arm(arm, 22.0 * on)
     return body.solved()
 
@@ -131,11 +131,11 @@ def thrown(joints: Array, fps: float, wish: FineWish, rng: np.random.Generator) 
     if begun is None:
         return None
     side, body, time, times = begun
-    twist, trunk = (smooth(way_through(time, times, each), 0.04, fps) for each in (THROW_TWIST, THROW_TRUNK))
+    twist, trunk = (smooth_seconds(way_through(time, times, each), 0.04, fps) for each in (THROW_TWIST, THROW_TRUNK))
     body.lean(SIGN[side] * twist, "up")
     body.lean(trunk, "left")
     body.shift(-0.03 * _on(time, times), forward=0.002 * trunk)
-    place = smooth(way_through(time, times, THROW_WAY), 0.025, fps)
+    place = smooth_seconds(way_through(time, times, THROW_WAY), 0.025, fps)
     way = eased((time - times[0] + 0.4) / 0.4) * (1 - eased((time - times[-1]) / 0.4))
     body.move_arm(side, way, *body.reach(side, place, (0.9, -0.2, -0.4)), lag=0.0, straight=True)
     ahead = np.array([0.08, -0.06, 0.42]) + _after(time, times)[:, None] * np.array([0.14, -0.30, -0.34])

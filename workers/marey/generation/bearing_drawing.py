@@ -9,13 +9,13 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.checks.kinematics import smooth
 from marey.generation.bearing import BorneSpan
 from marey.generation.bearing_times import BearingAmounts, amounts_of_bearings
 from marey.generation.gaits import GAITS, stomping
 from marey.generation.leans import trunk_shares
 from marey.generation.port import MotionFeatures
 from marey.motion.features import FeatureLayout, encode_all
+from marey.motion.filters import smooth_seconds
 from marey.motion.rotations import normalize
 from marey.motion.skeleton import HUMANML3D
 from marey.posing.standing import ARMS, LEFT, LEGS, NECK, OTHER_SIDE, RIGHT, StandingBody, way_through
@@ -173,7 +173,7 @@ class _Drawing:
         """Return -1 to 1 (T,): 1 while the body goes over its right foot, -1 over its left one."""
         body = self._body
         apart = body.local(body.joints[:, 7] - body.joints[:, 8], LEFT)[:, 2]
-        moves = np.gradient(smooth(apart, 0.05, self._fps))
+        moves = np.gradient(smooth_seconds(apart, 0.05, self._fps))
         return np.clip(moves / max(float(np.percentile(np.abs(moves), 85)), UPPER_STEPS), -1.0, 1.0)
 
     def _swing(self, side: str) -> None:
@@ -182,7 +182,7 @@ class _Drawing:
         bones = []
         for a, b in ((shoulder, elbow), (elbow, wrist)):
             here = body.local(normalize(body.joints[:, b] - body.joints[:, a]), side)
-            calm = smooth(here, SWING_S, self._fps)
+            calm = smooth_seconds(here, SWING_S, self._fps)
             bones.append(normalize(calm + self._bearing.swing * (here - calm)))
         body.move_arm(side, self._ways.arms, *bones, lag=0.0, straight=True)
 
@@ -214,7 +214,7 @@ class _Drawing:
         foot = body.joints[:, LEGS[OTHER_SIDE[side]][2]]
         ahead = np.clip(body.local(foot - body.joints[:, 0], side)[:, 2], *PLANTS)
         up = PLANT_UP * np.maximum(foot[:, 1] - foot[:, 1].min() - 0.02, 0.0)
-        return smooth(np.stack([np.zeros_like(ahead), up, ahead], axis=-1), 0.05, self._fps)
+        return smooth_seconds(np.stack([np.zeros_like(ahead), up, ahead], axis=-1), 0.05, self._fps)
 
     def _keyed(self, values: Sequence[float] | Sequence[Vector]) -> Array:
         """Return numbers (T,), or points (T, 3), that are `values` at the times of the keys; 0 if there are none."""
@@ -224,11 +224,11 @@ class _Drawing:
         times = self._bearing.keys.times
         if self._done is None:
             at = (self._pace * self._time + self._begins) % times[-1]
-            return smooth(way_through(at, times, values), KEYED_S, self._fps)
+            return smooth_seconds(way_through(at, times, values), KEYED_S, self._fps)
         again = times[-1] + self._bearing.returns_s
         rounds = [number * again + np.array(times) for number in range(self._times)]
         points = np.concatenate([np.asarray(values, np.float64)] * self._times)
-        return smooth(way_through(self._done, np.concatenate(rounds), points), KEYED_S, self._fps)
+        return smooth_seconds(way_through(self._done, np.concatenate(rounds), points), KEYED_S, self._fps)
 
     def _strokes(self, hz: float) -> Array:
         """Return an oscillation (T,) between -1 and 1: of a gesture from its least on, where it ends too if it makes

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.checks.kinematics import smooth
 from marey.generation.bearing import BorneSpan
 from marey.generation.done import AGAIN_HELD, BEGINS_S, FALL, PACES, raised_s
 from marey.generation.gaits import STAMP_S
+from marey.motion.filters import smooth_seconds
 from marey.posing.standing import envelope
 from marey.vocabulary.bearings import (
     Bearing,
@@ -81,7 +81,7 @@ def amounts_of_bearings(
             begin, end = _held_in(span, each, fps, goes_on=any(other.end == span.begin for other, _ in having))
             held[each.shown_in(span.action) or "trunk"][begin:end] = 1.0
         legs, arms, trunk = (
-            np.clip(smooth(mask, PASSES_S, fps), 0.0, 1.0)
+            np.clip(smooth_seconds(mask, PASSES_S, fps), 0.0, 1.0)
             for mask in (held["body"], held["body"] + held["upper"], held["body"] + held["upper"] + held["trunk"])
         )
         yield having[-1][1], BearingAmounts(trunk, arms, legs), rng

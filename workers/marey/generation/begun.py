@@ -12,7 +12,7 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.generation.footing import RUNS
+from marey.generation.footing import RUN_SPEEDS
 from marey.generation.port import Limits
 from marey.motion.features import FeatureLayout
 from marey.motion.filters import smooth
@@ -42,7 +42,7 @@ def frames_to_begin(action: str, frames: int, limits: Limits) -> int:
     `frames` for other actions."""
     if action == "walk":
         return max(frames, limits.within(round(SHORT_WALK_S * limits.fps)))
-    return limits.within(frames + round(LEAD_S * limits.fps)) if action in RUNS else frames
+    return limits.within(frames + round(LEAD_S * limits.fps)) if action in RUN_SPEEDS else frames
 
 
 def begun(features: Float32, layout: FeatureLayout, action: str, said: str = "") -> int:
@@ -55,12 +55,12 @@ def begun(features: Float32, layout: FeatureLayout, action: str, said: str = "")
         action: id in the vocabulary.
         said: the prompt; where it asks for a start from rest, the body stands for a moment before it.
     """
-    if action not in RUNS:
+    if action not in RUN_SPEEDS:
         return 0
     way = layout.decode(features)[:, 0, [0, 2]].astype(np.float64)
     speed = np.linalg.norm(smooth(np.gradient(way, axis=0), SMOOTH_S * layout.fps), axis=1) * layout.fps
     top = np.quantile(speed, 0.8)
-    if top < UNDER_WAY * RUNS[action]:
+    if top < UNDER_WAY * RUN_SPEEDS[action]:
         return 0
     before_s = STANDS_S if _STARTS.search(said.lower()) else SETS_OFF_S
     return max(int((speed > UNDER_WAY * top).argmax()) - round(before_s * layout.fps), 0)

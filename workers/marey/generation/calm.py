@@ -7,7 +7,7 @@ import random
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.checks.kinematics import smooth
+from marey.motion.filters import smooth_seconds
 from marey.posing.still import standing_still
 
 Array = NDArray[np.floating]
@@ -35,7 +35,7 @@ def calm(joints: Array, fps: float, rng: np.random.Generator) -> Array:
     if not any(planted):
         return standing_still(len(joints), random.Random(int(rng.integers(2**62))))  # noqa: S311
     first = int(np.argmin(np.where(planted, costs, np.inf)))
-    part = smooth(joints[first : first + long].reshape(long, -1), 0.1, fps).reshape(long, -1, 3)
+    part = smooth_seconds(joints[first : first + long].reshape(long, -1), 0.1, fps).reshape(long, -1, 3)
     mean = part.mean(0)
     part = mean + min(1.0, BREATHES / max(float(np.abs(part - mean).max()), 1e-6)) * (part - mean)
     to_and_fro = np.concatenate([part, part[-2:0:-1]])

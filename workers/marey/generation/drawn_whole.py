@@ -32,9 +32,8 @@ from marey.motion.features import FeatureLayout, encode_all
 from marey.posing.limbs import FPS
 from marey.posing.standing import LEFT, RIGHT, StandingBody
 from marey.posing.still import standing_still
-from marey.quality.record import SHOWN
 from marey.selector.motion import SHORTEST, Motion
-from marey.selector.rules import RULES
+from marey.selector.rules import is_shown
 from marey.vocabulary.paces import stated_pace
 
 Float32 = NDArray[np.float32]
@@ -105,7 +104,7 @@ def drawn_whole(layout: FeatureLayout, action: str, wish: FineWish, seed: int, f
 
 def _shows(made: DrawnWhole, layout: FeatureLayout, action: str) -> bool:
     """Return True if a drawn motion shows its action, however it was hurried."""
-    return len(made.features) < SHORTEST or RULES[action](Motion(layout.decode(made.features), FPS), "") >= SHOWN
+    return len(made.features) < SHORTEST or is_shown(Motion(layout.decode(made.features), FPS), action)
 
 
 def _one(layout: FeatureLayout, action: str, wish: FineWish, seed: int, frames: int | None) -> DrawnWhole | None:
@@ -158,7 +157,7 @@ def _shown(action: str, wish: FineWish, rng: random.Random, frames: int | None) 
         if action in WEIGHS:
             joints = with_weight(joints, random.Random(f"{gesture.seconds} weight"))  # noqa: S311
         side = wish.side if gesture.side in (LEFT, RIGHT) else ""
-        if RULES[action](Motion(joints, FPS), side) >= SHOWN:
+        if is_shown(Motion(joints, FPS), action, side):
             return gesture, joints
     return None
 

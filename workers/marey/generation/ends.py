@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.generation.flights import JUMPS, UP_M, lowest_foot
-from marey.generation.footing import RUNS
 from marey.motion.features import FeatureLayout
+from marey.vocabulary.courses import RUNS
 
 Float32 = NDArray[np.float32]
 
@@ -22,7 +22,7 @@ STAYING = frozenset({"kneel", "crouch", "sit", "sit-down", "sit-floor", "lie", "
 """Actions that end in a posture which is held."""
 WALKS = frozenset({"walk", "walk-backward", "sneak", "carry", "limp", "march"})
 """Actions that end with both feet down."""
-SETTLING = WALKS | RUNS.keys()
+SETTLING = WALKS | RUNS
 """Actions that end on a settled step."""
 STEP_S, DOWN_M = 0.7, 0.012
 """Seconds at the end of a way that are left out at most, in which a step is not made to its end, and metres over the

@@ -16,10 +16,11 @@ from marey.generation.onward import gone_on_with_strides
 from marey.motion.courses import gradient
 from marey.motion.features import FeatureLayout
 from marey.motion.feet import runs
+from marey.vocabulary.courses import RUNS
 
 Float32 = NDArray[np.float32]
 
-EVEN = frozenset({"run", "sprint"})
+EVEN = RUNS
 """Actions whose strides are alike."""
 HIGH, LONGEST_S = 0.08, 0.28
 """Metres over its resting height from which a foot is in the air, and seconds of the longest flight of a run."""

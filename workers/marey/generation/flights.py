@@ -12,11 +12,11 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from marey.checks.kinematics import smooth
-from marey.generation.footing import RUNS
 from marey.motion.features import FeatureLayout, encode_all
 from marey.motion.feet import runs
+from marey.motion.filters import smooth_seconds
 from marey.posing.limbs import GRAVITY
+from marey.vocabulary.courses import RUNS
 
 Array = NDArray[np.floating]
 Float32 = NDArray[np.float32]
@@ -63,7 +63,7 @@ def fallen(features: Float32, layout: FeatureLayout) -> Float32 | None:
         rate[begin:end] = np.clip((end - begin) / _longest(low[begin:end], fps), 1.0, FASTEST)
     if not begins and rate.max() <= 1.0:
         return None
-    joints, rate = joints[begins:], smooth(rate, PASSES_S, fps)[begins:]
+    joints, rate = joints[begins:], smooth_seconds(rate, PASSES_S, fps)[begins:]
     times = np.concatenate([[0.0], np.cumsum(1.0 / rate)[:-1]])  # of each frame, where it is played
     frames = int(times[-1]) + 1
     at = np.interp(np.arange(frames), times, np.arange(len(joints)))
@@ -84,7 +84,7 @@ def on_floor(features: Float32, layout: FeatureLayout, action: str = "") -> Floa
     joints, fps = layout.decode(features).astype(np.float64), layout.fps
     reach = round((STEP_REACH_S if action in RUNS else REACH_S) * fps)
     near = sliding_window_view(np.pad(lowest_foot(joints), reach, mode="edge"), 2 * reach + 1)
-    drift = smooth(near.min(1), 0.5 * reach / fps, fps)
+    drift = smooth_seconds(near.min(1), 0.5 * reach / fps, fps)
     if drift.max() < DRIFT_M:
         return None
     joints[..., 1] -= np.maximum(drift, 0.0)[:, None]
@@ -107,7 +107,7 @@ def lowered(features: Float32, layout: FeatureLayout) -> Float32 | None:
             hangs[begin:end] = 1.0
     if not hangs.any():
         return None
-    joints[..., 1] -= (smooth(hangs, PASSES_S, fps) * np.maximum(low, 0.0))[:, None]
+    joints[..., 1] -= (smooth_seconds(hangs, PASSES_S, fps) * np.maximum(low, 0.0))[:, None]
     return encode_all(layout, joints)
 
 

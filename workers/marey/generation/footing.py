@@ -20,7 +20,7 @@ from marey.motion.filters import smooth
 
 Float32 = NDArray[np.float32]
 
-RUNS: Mapping[str, float] = {"run": 2.1, "sprint": 4.2}
+RUN_SPEEDS: Mapping[str, float] = {"run": 2.1, "sprint": 4.2}
 """Actions whose feet are looked at, and metres a second that the body keeps: slower, it would not run."""
 WAY_S = 0.5
 """Standard deviation of the filter that leaves the way of the body, seconds."""

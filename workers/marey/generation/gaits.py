@@ -14,10 +14,10 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.checks.kinematics import smooth
 from marey.generation.turned import bent_along
 from marey.motion.courses import natural_course
 from marey.motion.features import FeatureLayout
+from marey.motion.filters import smooth_seconds
 from marey.motion.skeleton import HUMANML3D
 from marey.posing.limbs import BONE_LENGTHS, GRAVITY
 from marey.posing.standing import LEFT, LEGS, OTHER_SIDE, RIGHT, StandingBody, eased
@@ -103,12 +103,12 @@ def limping(joints: Array, layout: FeatureLayout, begin: int, end: int, side: st
     body = StandingBody(joints)
     over, other = (_stands(body, each, layout.fps) for each in (hurt, OTHER_SIDE[hurt]))
     inside = _inside(len(joints), begin, end, layout.fps)
-    dips = inside * smooth(over, 0.06, layout.fps)
+    dips = inside * smooth_seconds(over, 0.06, layout.fps)
     rate = 1.0 + inside * (HURRIES * over - LINGERS * other)
     body.shift(-DIP * dips)
     body.lean((1.0 if hurt == RIGHT else -1.0) * ASIDE * dips, "forward")
     body.lean(AHEAD * dips, "left")
-    return _retimed(body.solved(), smooth(rate, 0.06, layout.fps), begin, end)
+    return _retimed(body.solved(), smooth_seconds(rate, 0.06, layout.fps), begin, end)
 
 
 def staggering(
@@ -208,7 +208,7 @@ def stomping(
     """Return joints (T, 22, 3) of a walk that stomps in the frames `begin` to `end`, or of a body that stands and
     stamps with its feet in turn, or that of the `side`, over and over or a number of `times`; see `limping`."""
     fps, inside = layout.fps, _inside(len(joints), begin, end, layout.fps)
-    goes = np.clip(smooth((_speed(joints, fps) > STILL).astype(float), 0.15, fps), 0.0, 1.0)
+    goes = np.clip(smooth_seconds((_speed(joints, fps) > STILL).astype(float), 0.15, fps), 0.0, 1.0)
     lifts = {each: goes * lift for each, lift in _lifts(joints, fps, inside).items()}
     rounds, stamps = np.arange(len(joints)) / fps / STAMP_S + rng.uniform(), inside
     if times is not None:
@@ -222,7 +222,7 @@ def stomping(
         lifts[each] = lifts[each] + (1.0 - goes) * stamps * its * np.sin(np.pi * np.minimum(rounds % 1.0 / 0.6, 1.0))
     body = StandingBody(_knees_lifted(joints, lifts, KNEE_STOMPS))
     falls = np.maximum(*(-np.gradient(lift) * fps * STOMP_FALLS_S for lift in lifts.values()))
-    body.shift(-STOMPS * inside * np.clip(smooth(falls, 0.05, fps), 0.0, 1.0))
+    body.shift(-STOMPS * inside * np.clip(smooth_seconds(falls, 0.05, fps), 0.0, 1.0))
     return body.solved()
 
 
@@ -258,10 +258,10 @@ def on_toes(joints: Array, layout: FeatureLayout, begin: int, end: int, side: st
         apart = body.joints[:, hip] - body.joints[:, ankle]
         level = np.linalg.norm(apart[:, [0, 2]], axis=-1)
         reach.append(np.sqrt(np.maximum(longest**2 - level**2, 0.0)) - apart[:, 1])
-    room = np.clip(smooth(np.minimum(*reach), 0.12, fps), 0.0, TIPTOE_RISE)
+    room = np.clip(smooth_seconds(np.minimum(*reach), 0.12, fps), 0.0, TIPTOE_RISE)
     body.shift(inside * np.minimum(room, np.minimum(*reach)))
     trunk = body.local(body.joints[:, HUMANML3D.index("neck")] - body.joints[:, 0], LEFT)
-    lean = np.degrees(np.arctan2(smooth(trunk[:, 2], 0.3, fps), smooth(trunk[:, 1], 0.3, fps)))
+    lean = np.degrees(np.arctan2(smooth_seconds(trunk[:, 2], 0.3, fps), smooth_seconds(trunk[:, 1], 0.3, fps)))
     body.lean(-TIPTOE_UPRIGHT * inside * np.maximum(lean, 0.0), "left")
     return body.solved()
 
@@ -285,7 +285,7 @@ def over_rope(joints: Array, layout: FeatureLayout, begin: int, end: int, side: 
 def _lifts(joints: Array, fps: float, inside: Array) -> dict[str, Array]:
     """Return 0 to 1 (T,) for each side: how much its knee is lifted, while its foot passes the other one."""
     body = StandingBody(joints)
-    return {side: inside * smooth(_stands(body, OTHER_SIDE[side], fps), LIFTS_S, fps) for side in LEGS}
+    return {side: inside * smooth_seconds(_stands(body, OTHER_SIDE[side], fps), LIFTS_S, fps) for side in LEGS}
 
 
 def _knees_lifted(joints: Array, lifts: Mapping[str, Array], degrees: float) -> Array:
@@ -325,7 +325,7 @@ def tapping(joints: Array, layout: FeatureLayout, begin: int, end: int, side: st
     time = np.arange(len(joints)) / layout.fps
     busy = (time + rng.uniform(0, TAPS_S[0])) % sum(TAPS_S) < TAPS_S[0]
     speed = _speed(joints, layout.fps)
-    way = _inside(len(joints), begin, end, layout.fps) * smooth(
+    way = _inside(len(joints), begin, end, layout.fps) * smooth_seconds(
         (busy & (speed < STILL)).astype(float), 0.08, layout.fps
     )
     moved = joints.copy()
@@ -338,7 +338,7 @@ def shifting(joints: Array, layout: FeatureLayout, begin: int, end: int, side: s
     frames `begin` to `end`; see `limping`."""
     del side  # over both
     time, body = np.arange(len(joints)) / layout.fps, StandingBody(joints)
-    stands = smooth((_speed(joints, layout.fps) < STILL).astype(float), 0.2, layout.fps)
+    stands = smooth_seconds((_speed(joints, layout.fps) < STILL).astype(float), 0.2, layout.fps)
     way = _inside(len(joints), begin, end, layout.fps) * np.clip(stands, 0.0, 1.0)
     hz = max(rng.uniform(*SHIFTS_HZ), min(LEAST_SHIFTS * layout.fps / max(end - begin, 1), SHIFTS_FASTEST_HZ))
     swing = np.sin(2 * np.pi * hz * time + rng.uniform(0, 2 * np.pi))
@@ -366,20 +366,20 @@ GAITS: Mapping[Gait, Callable[[Array, FeatureLayout, int, int, str, np.random.Ge
 
 def _speed(joints: Array, fps: float) -> Array:
     """Return the metres a second (T,) of the hips."""
-    return np.linalg.norm(np.gradient(smooth(joints[:, 0], 0.2, fps), axis=0), axis=-1) * fps
+    return np.linalg.norm(np.gradient(smooth_seconds(joints[:, 0], 0.2, fps), axis=0), axis=-1) * fps
 
 
 def _inside(frames: int, begin: int, end: int, fps: float) -> Array:
     inside = np.zeros(frames)
     inside[begin:end] = 1.0
-    return np.clip(smooth(inside, 0.15, fps), 0.0, 1.0)
+    return np.clip(smooth_seconds(inside, 0.15, fps), 0.0, 1.0)
 
 
 def _stands(body: StandingBody, side: str, fps: float) -> Array:
     """Return 0 to 1 (T,): how much the body goes over a foot, which falls behind the other as it does."""
     this, other = ANKLES[side], ANKLES[OTHER_SIDE[side]]
     apart = body.local(body.joints[:, this] - body.joints[:, other], LEFT)[:, 2]
-    falls = -np.gradient(smooth(apart, 0.05, fps))
+    falls = -np.gradient(smooth_seconds(apart, 0.05, fps))
     return np.clip(falls / max(float(np.percentile(np.abs(falls), 80)), STEP), 0.0, 1.0)
 
 

@@ -17,7 +17,7 @@ from marey.generation.fine_wish import FineWish
 from marey.posing.standing import LEFT, RIGHT
 from marey.vocabulary.counts import stated_count
 from marey.vocabulary.gazes import without_gaze
-from marey.vocabulary.lengths import TO_TWENTY
+from marey.vocabulary.lengths import NUMBERS, TO_TWENTY
 from marey.vocabulary.paces import stated_pace
 
 MOST_RUNGS = 14
@@ -26,9 +26,8 @@ LOW_RUNGS = 2, 3
 """Rungs that are climbed before another movement, since all movements begin on one floor."""
 _GOES_ON = re.compile(r"\b(?:climb|hang|dangl|clamber|hoist|pull|scal)\w*|\b(?:onto|over) (?:the|a)\b")
 """Words of movements that go on from a ladder, and not from the floor."""
-_NUMBERS = {word: number for number, word in enumerate(TO_TWENTY.split(), 1)}
 _RUNGS = re.compile(
-    rf"\b(\d{{1,2}}|{'|'.join(_NUMBERS)}|couple of|few) (?:more )?(?:rungs?|steps?|holds?)\b(?! (?:at|after|by)\b)"
+    rf"\b(\d{{1,2}}|{TO_TWENTY}|couple of|few) (?:more )?(?:rungs?|steps?|holds?)\b(?! (?:at|after|by)\b)"
 )
 _DOWN = re.compile(r"\b(?:down|downwards?|descend\w*|descent\w*|lowers?|rappel\w*|abseil\w*)\b")
 _UP = re.compile(r"\b(?:up|upwards?|ascend\w*|ascent|higher)\b")
@@ -94,7 +93,7 @@ def climb(wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
 
 def _rungs(text: str) -> int | None:
     """Return the number of rungs that a text names; None if it names none, or several numbers."""
-    some = _NUMBERS | {"couple of": 2, "few": 3}
+    some = {**NUMBERS, "couple of": 2, "few": 3}
     found = {some.get(match[1]) or int(match[1]) for match in _RUNGS.finditer(text)}
     return min(max(found.pop(), 1), MOST_RUNGS) if len(found) == 1 else None
 

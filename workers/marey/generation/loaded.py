@@ -12,11 +12,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.checks.kinematics import smooth
 from marey.generation.carrying import WALKS
 from marey.generation.timed import CUT, TimedText
 from marey.generation.wish import action_of
 from marey.motion.features import FeatureLayout, encode_all
+from marey.motion.filters import smooth_seconds
 from marey.motion.skeleton import HUMANML3D
 from marey.posing.standing import ARMS, StandingBody
 from marey.vocabulary.bearings import UPRIGHT, load_bearings
@@ -48,7 +48,7 @@ def with_load(features: Float32, layout: FeatureLayout, rows: Sequence[TimedText
     held = np.zeros(len(features))
     for first, last in runs:
         held[_begins(rows[first], away, layout.fps) : _ends(rows[last], away, layout.fps)] = 1.0
-    share = np.clip(smooth(held, _FADES_S, layout.fps), 0.0, 1.0)
+    share = np.clip(smooth_seconds(held, _FADES_S, layout.fps), 0.0, 1.0)
     for side, (upper, fore) in bones.items():
         body.move_arm(side, share, upper, fore, lag=0.0, straight=True)
     return encode_all(layout, body.solved())

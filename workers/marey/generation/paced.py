@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from marey.motion.courses import course_of
 from marey.motion.features import FeatureLayout
-from marey.selector.matching import WAYS
 from marey.vocabulary.bearing_words import stated_bearings
+from marey.vocabulary.courses import WAYS
 from marey.vocabulary.paces import Pace, stated_pace
 
 Float32 = NDArray[np.float32]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.checks.kinematics import smooth
 from marey.motion.features import FeatureLayout, encode_all
+from marey.motion.filters import smooth_seconds
 from marey.posing.standing import poses_at
 
 Float32 = NDArray[np.float32]
@@ -37,5 +37,5 @@ def with_held_pose(features: Float32, layout: FeatureLayout, seconds: float) -> 
     if more <= 0:
         return features
     index = np.concatenate([np.arange(at), np.full(more, at), np.arange(at, len(joints))]).astype(float)
-    index[1:-1] = smooth(index, EASES_S, layout.fps)[1:-1]
+    index[1:-1] = smooth_seconds(index, EASES_S, layout.fps)[1:-1]
     return encode_all(layout, poses_at(joints, index))

@@ -11,7 +11,6 @@ import random
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.checks.kinematics import smooth
 from marey.drawing.floor_ways import rolls_between, way_over_floor
 from marey.drawing.holds import BACK, FRONT, PRONE, SLIDE, SLIDES_M, SLIDES_S, passing
 from marey.drawing.passing import pose
@@ -20,6 +19,7 @@ from marey.generation.done import done_s, feet_s
 from marey.generation.posture import RowPosture
 from marey.generation.whole_body import retimed
 from marey.motion.features import FeatureLayout, encode_all
+from marey.motion.filters import smooth_seconds
 from marey.motion.rotations import normalize
 from marey.posing.limbs import FPS
 from marey.posing.standing import ARMS, LEFT, LEGS, NECK, StandingBody, eased
@@ -177,7 +177,7 @@ def _acts(made: StandingBody) -> dict[str, Array]:
         raised = np.degrees(np.arccos(np.clip(-bones[0][:, 1], -1.0, 1.0)))
         off = np.maximum(np.maximum(*turned), raised if raised[0] > ACTS else 0.0)
         acts = np.clip((off - RESTS) / (ACTS - RESTS), 0.0, 1.0)
-        found[side] = np.clip(smooth(acts, PASSES_S, FPS), 0.0, 1.0)
+        found[side] = np.clip(smooth_seconds(acts, PASSES_S, FPS), 0.0, 1.0)
     return found
 
 

@@ -7,7 +7,6 @@ that is drawn.
 from __future__ import annotations
 
 import random
-import re
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,36 +23,11 @@ from marey.posing.standing import LEGS, StandingBody, eased
 Float32 = NDArray[np.float32]
 Array = NDArray[np.floating]
 
-SKIDDING = frozenset({"run", "sprint"})
-"""Actions that may end in a skid."""
 RUNS_S, LEAST_M = (1.6, 2.6), 1.8
 """Seconds of a run before it at most where its length is open, and metres a second of a run at least."""
 STRIDE, PASSES = 14, 7
 """Frames near the end of a run that are searched for the moment in which it passes into a skid, and those of the way
 from one to the other."""
-_STOP = r"(?:stop|halt|standstill|rest)"
-_SKIDS = re.compile(
-    rf"\b(?:skid(?:s|ding|ded)?|slid(?:es?|ing)) (?:\w+ )?(?:to|into) (?:a|an) (?:\w+ )?{_STOP}\b|\bskids?\b"
-    rf"|\b(?:skidding|screeching|sliding) {_STOP}\b|\bscreech(?:es|ing)? to\b|\bslides?\W*$"
-)
-_STOPS = re.compile(
-    rf"\b(?:stop|halt)(?:s|ping|ing)? (?:abruptly|suddenly|short|dead|sharply|instantly|at once)\b"
-    rf"|\b(?:abrupt|sudden|sharp|dead|emergency) {_STOP}\b|\b(?:abruptly|suddenly|sharply) (?:stop|halt)s?\b"
-    rf"|\b(?:slams?|hits?) (?:on )?the brakes\b|\bbrakes? (?:hard|sharply|abruptly)\b"
-)
-
-
-def skids(said: str, action: str) -> str:
-    """Return `skid` or `stop`, with which a prompt of a run says that it ends; empty for others.
-
-    Args:
-        said: the prompt.
-        action: its id.
-    """
-    text = said.lower()
-    if action not in SKIDDING or re.search(r"\b(?:knees?|base|board|ice|slides? (?:under|down|across))\b", text):
-        return ""
-    return "skid" if _SKIDS.search(text) else "stop" if _STOPS.search(text) else ""
 
 
 def skidded(features: Float32, layout: FeatureLayout, how: str, seed: int, fixed: int | None = None) -> Float32 | None:

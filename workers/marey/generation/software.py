@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from importlib.metadata import version
 from typing import Any
 
 import torch
 
+from marey.core.package import own_version
 from marey.generation.port import Generator, S
 
 
@@ -25,7 +25,7 @@ def origin_of(generator: Generator[S], settings: S) -> dict[str, Any]:
 def software_of(generator: Generator[Any]) -> dict[str, Any]:
     """Return the inputs of equal tokens beside the request: device kind, number type, threads, versions."""
     return {
-        "marey": version("marey"),
+        "marey": own_version(),
         "torch": torch.__version__,
         "device": generator.device.type,
         "dtype": str(generator.dtype).removeprefix("torch."),

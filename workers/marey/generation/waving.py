@@ -16,10 +16,9 @@ from marey.motion.filters import smooth, smoothstep
 from marey.motion.kinematics import facing
 from marey.motion.rotations import Array, from_rotvec, rotate
 from marey.motion.skeleton import HUMANML3D
-from marey.quality.record import SHOWN
 from marey.selector.motion import UP, Motion
 from marey.selector.repetitions import REPETITIONS
-from marey.selector.rules import RULES
+from marey.selector.rules import is_shown
 
 LEAST_S = 0.8
 """Seconds for which a hand is up at least that waves."""
@@ -46,7 +45,7 @@ def waved(joints: Array, fps: float, wish: FineWish, rng: np.random.Generator) -
     if not spans:
         return None
     motion, count = Motion(joints, fps), wish.count
-    draws = RULES["wave"](motion, "") < SHOWN if count is None else len(REPETITIONS["wave"](motion)) != count
+    draws = not is_shown(motion, "wave") if count is None else len(REPETITIONS["wave"](motion)) != count
     longest = max(end - begin for _, begin, end in spans)
     rate, degrees = rng.uniform(*HZ), rng.uniform(*DEGREES)
     moved = joints.copy()

@@ -19,12 +19,12 @@ from marey.generation.steered import CLOSED, frames_of_circle
 from marey.generation.stepped import frames_of_steps
 from marey.generation.whole_body import AGAIN
 from marey.selector.limbs import NamedLimb, limb_of
-from marey.selector.matching import TURNING, WAYS, Step, wanted_of
+from marey.selector.matching import TURNING, Step, wanted_of
 from marey.selector.repetitions import REPETITIONS
 from marey.text.features import TextFeatures
 from marey.vocabulary.counts import STEPPING, stated_count
 from marey.vocabulary.courses import STRAIGHT as STRAIGHT_ON
-from marey.vocabulary.courses import WayCourse, stated_course
+from marey.vocabulary.courses import WAYS, WayCourse, stated_course
 from marey.vocabulary.distances import stated_distance
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.gazes import Glance, stated_gaze, without_gaze

@@ -4,20 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from marey.checks.kinematics import (
-    ANKLES,
-    HEAD,
-    PELVIS,
-    SHOULDERS,
-    WRISTS,
-    body_frame,
-    smooth,
-    swings,
-    variety,
-    velocity,
-)
+from marey.checks.kinematics import ANKLES, HEAD, PELVIS, SHOULDERS, WRISTS, body_frame, swings, variety, velocity
 from marey.checks.stretch import Arm, both_arms
 from marey.motion.feet import runs
+from marey.motion.filters import smooth_seconds
 from marey.selector.gaits import stays
 from marey.selector.grades import SIDES, best, least, most, of_side, share, some
 from marey.selector.motion import SHORTEST, UP, Array, Motion
@@ -56,7 +46,7 @@ def _half_swings(m: Motion, k: int) -> int:
     """Return how often in a row a hand at the chest or over it swings by 7 cm or more, to and fro."""
     most_swings = 0
     for a, b in runs(m.hands[:, k, 1] > UP):
-        way = m.hands[a:b, k] - smooth(m.hands[a:b, k], 0.5, m.fps)
+        way = m.hands[a:b, k] - smooth_seconds(m.hands[a:b, k], 0.5, m.fps)
         if len(way) < SHORTEST:
             continue
         axis = np.linalg.svd(way - way.mean(axis=0), full_matrices=False)[2][0]
@@ -133,7 +123,7 @@ def kick(m: Motion, side: str) -> float:
 
 def kick_ball(m: Motion, side: str) -> float:
     """Swing a foot forward through a ball on the floor."""
-    forward = velocity(smooth(m.foot_local, 0.03, m.fps), m.fps)[..., 0]
+    forward = velocity(smooth_seconds(m.foot_local, 0.03, m.fps), m.fps)[..., 0]
     low = (m.feet < 0.3) & (np.abs(m.foot_local[..., 0]) < 0.4)
     through = np.where(low, forward, 0).max(axis=0)
     after = (m.foot_local[..., 0] * (m.feet > 0.1)).max(axis=0)
@@ -199,7 +189,7 @@ def slash(m: Motion, side: str) -> float:
 
 def throw(m: Motion, side: str) -> float:
     """Swing a hand back and forward, and let go."""
-    hands = smooth(m.joints[:, list(WRISTS)] - m.joints[:, [PELVIS]], 0.02, m.fps)
+    hands = smooth_seconds(m.joints[:, list(WRISTS)] - m.joints[:, [PELVIS]], 0.02, m.fps)
     forward, _ = body_frame(velocity(hands, m.fps), m.heading[:, None])
     after = round(0.5 * m.fps)
     grades = np.zeros(2)

@@ -6,8 +6,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from marey.checks.kinematics import ANKLES, HEAD, HIPS, PELVIS, SHOULDERS, WRISTS, smooth, swings, velocity
+from marey.checks.kinematics import ANKLES, HEAD, HIPS, PELVIS, SHOULDERS, WRISTS, swings, velocity
 from marey.motion.feet import runs
+from marey.motion.filters import smooth_seconds
 from marey.selector.floor import seated
 from marey.selector.gaits import walks
 from marey.selector.grades import best, every, least, most, of_side
@@ -34,7 +35,7 @@ def climb_onto(m: Motion, side: str) -> float:
 def hang(m: Motion, side: str) -> float:
     """Hang by the hands."""
     over = every(m.joints[:, list(WRISTS), 1] > m.joints[:, [HEAD], 1])
-    hold = np.linalg.norm(velocity(smooth(m.joints[:, list(WRISTS)], 0.1, m.fps), m.fps), axis=-1) < 0.5
+    hold = np.linalg.norm(velocity(smooth_seconds(m.joints[:, list(WRISTS)], 0.1, m.fps), m.fps), axis=-1) < 0.5
     return least(m.longest(over & every(hold) & (m.feet.min(axis=1) > 0.06)), 1.0, 0.25)
 
 
@@ -54,7 +55,7 @@ def drive(m: Motion, side: str) -> float:
     apart = np.linalg.norm(line, axis=-1)
     held = every(m.ahead[..., 0] > 0.15) & (apart > 0.22) & (apart < 0.65) & seated(m)
     angle = np.degrees(np.unwrap(np.arctan2(line[:, 1], np.abs(line[:, 2]))))
-    return min(least(m.most(held), 0.55, 0.15), least(float(np.ptp(smooth(angle, 0.1, m.fps))), 15, 6))
+    return min(least(m.most(held), 0.55, 0.15), least(float(np.ptp(smooth_seconds(angle, 0.1, m.fps))), 15, 6))
 
 
 def twist(m: Motion, side: str) -> float:
@@ -64,7 +65,7 @@ def twist(m: Motion, side: str) -> float:
         line = m.joints[:, pair[0]] - m.joints[:, pair[1]]
         return np.degrees(np.unwrap(np.arctan2(-line[:, 2], line[:, 0])))
 
-    against = smooth(yaw(SHOULDERS) - yaw(HIPS), 0.05, m.fps)
+    against = smooth_seconds(yaw(SHOULDERS) - yaw(HIPS), 0.05, m.fps)
     against -= 360 * np.round(float(np.median(against)) / 360)
     turns = swings(against, 25)
     sides = [against[a] * against[b] < 0 and min(abs(against[a]), abs(against[b])) > 8 for a, b in pairwise(turns)]

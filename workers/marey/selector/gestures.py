@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from marey.checks.kinematics import KNEES, PELVIS, SHOULDERS, WRISTS, smooth, swings
+from marey.checks.kinematics import KNEES, PELVIS, SHOULDERS, WRISTS, swings
 from marey.motion.feet import runs
+from marey.motion.filters import smooth_seconds
 from marey.selector.gaits import stays
 from marey.selector.grades import every, least, most, of_side, share, some
 from marey.selector.motion import Array, Bool, Motion
@@ -21,14 +22,14 @@ def laugh(m: Motion, side: str) -> float:
     """Rock and shake."""
     bends = len(swings(m.lean, 7)) - 1
     shoulders = m.joints[:, list(SHOULDERS), 1] - m.joints[:, [PELVIS], 1]
-    quick = smooth(shoulders - smooth(shoulders, 0.2, m.fps), 0.02, m.fps).mean(axis=1)
+    quick = smooth_seconds(shoulders - smooth_seconds(shoulders, 0.2, m.fps), 0.02, m.fps).mean(axis=1)
     shakes = (len(swings(quick, 0.003)) - 1) / m.seconds
     return min(least(bends, 2.5, 1), max(least(shakes, 1.5, 1), 0.6), stays(m), most(float(m.tilt.max()), 75, 10))
 
 
 def nod(m: Motion, side: str) -> float:
     """Tip the head down and up twice."""
-    nods = swings(smooth(m.pitch, 0.03, m.fps), 7)
+    nods = swings(smooth_seconds(m.pitch, 0.03, m.fps), 7)
     times = np.diff(nods) / m.fps
     steady = min(most(float(np.ptp(m.lean)), 14, 5), most(m.extent, 0.2, 0.08))
     return min(least(sum(times < 1.2), 2.5, 1), steady, most(float(np.percentile(m.hand_speed, 95)), 1.0, 0.4))
@@ -75,7 +76,7 @@ def guide(m: Motion, side: str) -> float:
 def shiver(m: Motion, side: str) -> float:
     """Tremble with the arms close."""
     points = m.joints[:, [*WRISTS, *SHOULDERS, *KNEES]] - m.joints[:, [PELVIS]]
-    quick = points - smooth(points, 0.12, m.fps)
+    quick = points - smooth_seconds(points, 0.12, m.fps)
     flat = quick.reshape(m.frames, -1)
     turns = sorted((len(swings(flat[:, c], 0.004)) / m.seconds for c in range(flat.shape[1])), reverse=True)
     near = every((np.hypot(m.ahead[..., 0], m.ahead[..., 2]) < 0.4) & (m.hands[..., 1] < 0.05) & (m.elbows > 50))
@@ -85,7 +86,7 @@ def shiver(m: Motion, side: str) -> float:
 def talk(m: Motion, side: str) -> float:
     """Talk with the hands."""
     low = (m.joints[:, list(WRISTS), 1] > m.joints[:, [PELVIS], 1]) & (m.hands[..., 1] < 0.1) & (m.ahead[..., 0] > 0.08)
-    speed = smooth(m.hand_speed, 0.2, m.fps)
+    speed = smooth_seconds(m.hand_speed, 0.2, m.fps)
     moves = some(low & (speed > 0.2) & (speed < 1.6))
     calm = most(float(np.percentile(m.hand_speed, 95)), 2.0, 0.5)
     small = most(share(some(m.hands[..., 1] > 0.15)), 0.15, 0.1)
@@ -101,7 +102,7 @@ def wash(m: Motion, side: str) -> float:
         front = (m.ahead[:, k, 0] > 0.1) & (m.elbows[:, k] > 8)
         for a, b in runs(front):
             if b - a > 8:
-                way = m.hands[a:b, k] - smooth(m.hands[a:b, k], 0.7, m.fps)
+                way = m.hands[a:b, k] - smooth_seconds(m.hands[a:b, k], 0.7, m.fps)
                 axes = np.linalg.svd(way - way.mean(axis=0), full_matrices=False)[2]
                 turns = swings(way @ axes[0], 0.09)
                 times = np.diff(turns) / m.fps

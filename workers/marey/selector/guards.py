@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from marey.checks.kinematics import ANKLES, HEAD, PELVIS, WRISTS, body_frame, smooth, velocity
+from marey.checks.kinematics import ANKLES, HEAD, PELVIS, WRISTS, body_frame, velocity
 from marey.motion.feet import runs
+from marey.motion.filters import smooth_seconds
 from marey.selector.grades import best, every, least, most, of_side
 from marey.selector.motion import CHEST, Array, Bool, Motion
 
@@ -131,7 +132,7 @@ def cast_spell(m: Motion, side: str) -> float:
 
 def dodge(m: Motion, side: str) -> float:
     """Move the head out of the way at once."""
-    head = smooth(m.joints[:, HEAD], 0.05, m.fps)
+    head = smooth_seconds(m.joints[:, HEAD], 0.05, m.fps)
     window, before = max(round(0.6 * m.fps), 1), max(round(0.5 * m.fps), 1)
     later = np.lib.stride_tricks.sliding_window_view(head, window + 1, axis=0)[before:] if m.frames > window else None
     if later is None or not len(later):
@@ -151,7 +152,7 @@ def dodge(m: Motion, side: str) -> float:
 
 def flinch(m: Motion, side: str) -> float:
     """Be jerked by a blow, and come back."""
-    points = smooth(m.joints[:, [HEAD, CHEST]], 0.03, m.fps)
+    points = smooth_seconds(m.joints[:, [HEAD, CHEST]], 0.03, m.fps)
     window, back = max(round(0.3 * m.fps), 1), round(2 * m.fps)
     if m.frames <= window + 1:
         return 0.0

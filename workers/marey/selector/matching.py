@@ -13,6 +13,7 @@ from marey.selector.motion import SHORTEST, Motion
 from marey.selector.repetitions import REPETITIONS
 from marey.selector.rules import EXACT, RULES, TURNS, WHILE_TURNING, Rule
 from marey.vocabulary.counts import STEPPING, is_single_step, stated_count
+from marey.vocabulary.courses import WAYS
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.legs import stated_leg
 from marey.vocabulary.scope import every_action, match_scope
@@ -28,8 +29,8 @@ NOT_AS_OFTEN = 0.4
 """Best value of a motion with another number of repetitions than was asked for."""
 WALKED = frozenset({"walk-backward", "sidestep"})
 """Ways of steps that do not go ahead."""
-WAYS, ON_THE_SPOT, TURNING = frozenset({"walk", "run", "sprint"}), "turn-around", "turn"
-"""A way and a turn to one side in one sentence are a turn on the way: "walks and turns left 90 degrees"."""
+ON_THE_SPOT, TURNING = "turn-around", "turn"
+"""A way (`WAYS`) and a turn to one side in one sentence are a turn on the way: "walks and turns left 90 degrees"."""
 SEVERAL: Mapping[str, int] = {"clap": 3, "jumping-jacks": 2, "nod": 2, "wave": 2, **dict.fromkeys(STEPPING, 4)}
 """Repetitions that the definition of an action asks for; a prompt may ask for fewer."""
 
@@ -40,7 +41,6 @@ _BENDS = re.compile(
 )
 """Words of a way that is not straight."""
 _SPOT = re.compile(r"\b(?:in place|on the spot|on one spot|on a treadmill)\b")
-_GAITS = frozenset({"walk", "run", "sprint"})
 _REASON = re.compile(
     r"\b(?:because|since (?:the|his|her|its|their)|as (?:the|his|her|its|their) (?:left|right|other)"
     r"|due to|so as|to (?:spare|protect|rest) )\b.*",
@@ -163,7 +163,7 @@ def _step(sentence: str) -> Step | None:
                 degrees=_degrees(prompt, name),
                 count=_count(prompt, name) if name == counted else None,
                 in_place=_is_in_place(name, wanted, prompt),
-                winds=name in _GAITS and _BENDS.search(prompt.lower()) is not None,
+                winds=name in WAYS and _BENDS.search(prompt.lower()) is not None,
             )
             for name in wanted
         )
@@ -173,7 +173,7 @@ def _step(sentence: str) -> Step | None:
 
 def _is_in_place(name: str, wanted: Sequence[str], prompt: str) -> bool:
     """Return True for a turn on the spot, and a gait whose words say that it does not travel."""
-    if name in _GAITS:
+    if name in WAYS:
         return _SPOT.search(prompt.lower()) is not None
     return name == TURNING and wanted == [TURNING] and turns_in_place(prompt)
 
@@ -219,7 +219,7 @@ def _grade(motion: Motion, step: Step) -> float:
 def _rule(wanted: WantedAction, rules: Mapping[str, Rule]) -> Rule:
     rules = {**rules, **WHILE_TURNING} if wanted.winds else rules
     rule = rules[wanted.action] if wanted.degrees is None else EXACT[wanted.action](wanted.degrees)
-    if wanted.in_place and wanted.action in _GAITS:
+    if wanted.in_place and wanted.action in WAYS:
         return lambda m, side: max(rule(m, side), on_the_spot(m, runs=wanted.action != "walk"))
     if wanted.in_place:
         on_way, on_spot = rule, turn_standing if wanted.degrees is None else EXACT[ON_THE_SPOT](wanted.degrees)

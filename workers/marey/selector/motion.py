@@ -21,12 +21,12 @@ from marey.checks.kinematics import (
     WRISTS,
     body_frame,
     heading,
-    smooth,
     trunk_up,
     velocity,
 )
 from marey.motion.body import STATURE, stature
 from marey.motion.feet import runs
+from marey.motion.filters import smooth_seconds
 from marey.motion.skeleton import HUMANML3D
 from marey.quality.measure import check_joints
 
@@ -145,18 +145,20 @@ class Motion:
     @Signal
     def place(self) -> Array:
         """(T, 2) place of the hips over the floor, smoothed."""
-        return smooth(self.joints[:, PELVIS], 0.1, self.fps)[:, [0, 2]]
+        return smooth_seconds(self.joints[:, PELVIS], 0.1, self.fps)[:, [0, 2]]
 
     @Signal
     def flow(self) -> Array:
         """(T, 2) speed of the hips forward and to the left, smoothed over a step, metres a second."""
-        forward, left = body_frame(velocity(smooth(self.joints[:, PELVIS], 0.25, self.fps), self.fps), self.heading)
+        forward, left = body_frame(
+            velocity(smooth_seconds(self.joints[:, PELVIS], 0.25, self.fps), self.fps), self.heading
+        )
         return np.stack([forward, left], axis=-1)
 
     @Signal
     def lean(self) -> Array:
         """(T,) degrees by which the trunk leans forward."""
-        up = smooth(trunk_up(self.joints), 0.08, self.fps)
+        up = smooth_seconds(trunk_up(self.joints), 0.08, self.fps)
         forward, _ = body_frame(up, self.heading)
         return np.degrees(np.arctan2(forward, up[:, 1]))
 
@@ -169,7 +171,7 @@ class Motion:
     def lively(self) -> Array:
         """(T,) mean speed of the joints relative to the hips, smoothed over half a second, metres a second."""
         local = self.joints - self.joints[:, :1]
-        return smooth(np.linalg.norm(velocity(local, self.fps), axis=-1).mean(axis=1), 0.5, self.fps)
+        return smooth_seconds(np.linalg.norm(velocity(local, self.fps), axis=-1).mean(axis=1), 0.5, self.fps)
 
     @Signal
     def pitch(self) -> Array:
@@ -189,13 +191,13 @@ class Motion:
     @Signal
     def foot_speed(self) -> Array:
         """(T, 2) speed of each ankle, metres a second."""
-        points = smooth(self.joints[:, list(ANKLES)], 0.03, self.fps)
+        points = smooth_seconds(self.joints[:, list(ANKLES)], 0.03, self.fps)
         return np.linalg.norm(velocity(points, self.fps), axis=-1)
 
     @Signal
     def step_speed(self) -> Array:
         """(T, 2) speed of the slower one of ankle and toe of each foot, metres a second."""
-        toes = velocity(smooth(self.joints[:, list(TOES)], 0.03, self.fps), self.fps)
+        toes = velocity(smooth_seconds(self.joints[:, list(TOES)], 0.03, self.fps), self.fps)
         return np.minimum(self.foot_speed, np.linalg.norm(toes, axis=-1))
 
     @Signal
@@ -220,13 +222,13 @@ class Motion:
     def hands(self) -> Array:
         """(T, 2, 3) each wrist from the middle of the shoulders: forward, up, left, metres."""
         middle = self.joints[:, list(SHOULDERS)].mean(axis=1, keepdims=True)
-        return _local(smooth(self.joints[:, list(WRISTS)] - middle, 0.03, self.fps), self.heading)
+        return _local(smooth_seconds(self.joints[:, list(WRISTS)] - middle, 0.03, self.fps), self.heading)
 
     @Signal
     def reach(self) -> Array:
         """(T, 2, 3) each wrist from its own shoulder: forward, up, left, metres."""
         arms = self.joints[:, list(WRISTS)] - self.joints[:, list(SHOULDERS)]
-        return _local(smooth(arms, 0.03, self.fps), self.heading)
+        return _local(smooth_seconds(arms, 0.03, self.fps), self.heading)
 
     @Signal
     def ahead(self) -> Array:
@@ -235,24 +237,26 @@ class Motion:
         pelvis, neck = self.joints[:, [PELVIS]], self.joints[:, [NECK]]
         wrists, rise = self.joints[:, list(WRISTS)], np.maximum((neck - pelvis)[..., 1], 0.05)
         along = np.clip((wrists[..., 1] - pelvis[..., 1]) / rise, 0, 1)
-        return _local(smooth(wrists - pelvis - along[..., None] * (neck - pelvis), 0.03, self.fps), self.heading)
+        return _local(
+            smooth_seconds(wrists - pelvis - along[..., None] * (neck - pelvis), 0.03, self.fps), self.heading
+        )
 
     @Signal
     def still(self) -> Array:
         """(T, 2) speed of each wrist about the shoulders, smoothed over a tenth of a second, metres a second."""
-        return smooth(np.linalg.norm(velocity(self.hands, self.fps), axis=-1), 0.1, self.fps)
+        return smooth_seconds(np.linalg.norm(velocity(self.hands, self.fps), axis=-1), 0.1, self.fps)
 
     @Signal
     def over(self) -> Array:
         """(T, 2) height of each wrist over the middle of the shoulders along the trunk, metres."""
         middle = self.joints[:, list(SHOULDERS)].mean(axis=1, keepdims=True)
         arms = self.joints[:, list(WRISTS)] - middle
-        return smooth(np.einsum("tki,ti->tk", arms, trunk_up(self.joints)), 0.05, self.fps)
+        return smooth_seconds(np.einsum("tki,ti->tk", arms, trunk_up(self.joints)), 0.05, self.fps)
 
     @Signal
     def hand_speed(self) -> Array:
         """(T, 2) speed of each wrist relative to the hips, metres a second."""
-        points = smooth(self.joints[:, list(WRISTS)] - self.joints[:, [PELVIS]], 0.03, self.fps)
+        points = smooth_seconds(self.joints[:, list(WRISTS)] - self.joints[:, [PELVIS]], 0.03, self.fps)
         return np.linalg.norm(velocity(points, self.fps), axis=-1)
 
     @Signal

@@ -8,8 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from marey.checks.kinematics import ANKLES, HEAD, WRISTS, smooth, swings, trunk_up, velocity
+from marey.checks.kinematics import ANKLES, HEAD, WRISTS, swings, trunk_up, velocity
 from marey.motion.feet import runs
+from marey.motion.filters import smooth_seconds
 from marey.selector.motion import OFF_FLOOR, UP, Array, Motion
 from marey.vocabulary.counts import STEPPING
 
@@ -85,21 +86,21 @@ def _steps(m: Motion) -> list[Repetition]:
 
 
 def _bows(m: Motion) -> list[Repetition]:
-    return _tops(smooth(m.lean, 0.1, m.fps), 15)
+    return _tops(smooth_seconds(m.lean, 0.1, m.fps), 15)
 
 
 def _squats(m: Motion) -> list[Repetition]:
-    return _tops(-smooth(m.hips, 0.1, m.fps), 0.2)
+    return _tops(-smooth_seconds(m.hips, 0.1, m.fps), 0.2)
 
 
 def _kicks(m: Motion) -> list[Repetition]:
-    feet = smooth(m.feet, 0.05, m.fps)
+    feet = smooth_seconds(m.feet, 0.05, m.fps)
     return _merged(([r for f, r in _rises(feet[:, k], 0.25) if feet[f, k] > 0.35] for k in (0, 1)), 0.1 * m.fps)
 
 
 def _thrusts(m: Motion) -> list[Repetition]:
     """A fist shot out ahead."""
-    far = smooth(np.linalg.norm(m.reach, axis=-1), 0.03, m.fps)
+    far = smooth_seconds(np.linalg.norm(m.reach, axis=-1), 0.03, m.fps)
     fast = round(0.3 * m.fps)
 
     def of(k: int) -> Iterator[Repetition]:
@@ -111,52 +112,52 @@ def _thrusts(m: Motion) -> list[Repetition]:
 
 
 def _claps(m: Motion) -> list[Repetition]:
-    gap = smooth(np.linalg.norm(m.joints[:, WRISTS[0]] - m.joints[:, WRISTS[1]], axis=-1), 0.03, m.fps)
+    gap = smooth_seconds(np.linalg.norm(m.joints[:, WRISTS[0]] - m.joints[:, WRISTS[1]], axis=-1), 0.03, m.fps)
     return [each for frame, each in _rises(-gap, 0.05) if gap[frame] < 0.25]
 
 
 def _raised(m: Motion) -> list[Repetition]:
     """A hand raised; of two hands, those of the busier one."""
-    heights = smooth(m.hands[..., 1], 0.1, m.fps)
+    heights = smooth_seconds(m.hands[..., 1], 0.1, m.fps)
     return max(([r for f, r in _rises(heights[:, k], 0.3) if heights[f, k] > -0.1] for k in (0, 1)), key=len)
 
 
 def _waves(m: Motion) -> list[Repetition]:
     """A lifted hand swung to one side and back; of two hands, those of the busier one."""
-    lifting = np.abs(velocity(smooth(m.hands[..., 1], 0.15, m.fps)[..., None], m.fps))[..., 0]
+    lifting = np.abs(velocity(smooth_seconds(m.hands[..., 1], 0.15, m.fps)[..., None], m.fps))[..., 0]
 
     def of(k: int) -> Iterator[Repetition]:
         for begin, end in runs((m.hands[:, k, 1] > UP) & (lifting[:, k] < 0.4)):
             aside = m.hands[begin:end, k, 2]
-            for each in _tops(aside - smooth(aside, 0.5, m.fps), 0.07):
+            for each in _tops(aside - smooth_seconds(aside, 0.5, m.fps), 0.07):
                 yield Repetition(begin + each.begin, begin + each.end)
 
     return max((list(of(k)) for k in (0, 1)), key=len)
 
 
 def _nods(m: Motion) -> list[Repetition]:
-    return _tops(smooth(m.pitch, 0.03, m.fps), 7)
+    return _tops(smooth_seconds(m.pitch, 0.03, m.fps), 7)
 
 
 def _push_ups(m: Motion) -> list[Repetition]:
-    return _tops(-smooth(m.joints[:, HEAD, 1], 0.1, m.fps), 0.12)
+    return _tops(-smooth_seconds(m.joints[:, HEAD, 1], 0.1, m.fps), 0.12)
 
 
 def _sit_ups(m: Motion) -> list[Repetition]:
-    return _tops(-smooth(m.tilt, 0.1, m.fps), 25)
+    return _tops(-smooth_seconds(m.tilt, 0.1, m.fps), 25)
 
 
 def _arms_up(m: Motion) -> list[Repetition]:
-    return _tops(smooth(m.hands[..., 1].min(axis=1), 0.1, m.fps), 0.4)
+    return _tops(smooth_seconds(m.hands[..., 1].min(axis=1), 0.1, m.fps), 0.4)
 
 
 def _upside_down(m: Motion) -> list[Repetition]:
-    up = smooth(trunk_up(m.joints)[:, 1], 0.05, m.fps)
+    up = smooth_seconds(trunk_up(m.joints)[:, 1], 0.05, m.fps)
     return [each for frame, each in _rises(-up, 0.8) if up[frame] < 0]
 
 
 def _knees(m: Motion) -> list[Repetition]:
-    thighs = smooth(m.thighs, 0.05, m.fps)
+    thighs = smooth_seconds(m.thighs, 0.05, m.fps)
     return _merged((_tops(thighs[:, k], 40) for k in (0, 1)), 0.1 * m.fps)
 
 

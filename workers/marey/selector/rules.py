@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+from marey.quality.record import SHOWN
 from marey.selector import arms, bodies, floor, gaits, gestures, guards, jumps
 from marey.selector.motion import Motion
 
@@ -106,3 +107,14 @@ WHILE_TURNING: Mapping[str, Rule] = {
     "sprint": gaits.sprint_any_way,
 }
 """Rules of gaits at once with a turn, which alone go straight ahead."""
+
+
+def is_shown(motion: Motion, action: str, side: str = "") -> bool:
+    """Return True if a motion shows an action by its rule.
+
+    Args:
+        motion: of the joints.
+        action: id of an action that has a rule.
+        side: `left`, `right` or `both`; empty where any will do.
+    """
+    return RULES[action](motion, side) >= SHOWN

@@ -13,6 +13,7 @@ from typing import Any
 
 from marey.checks.prompts import evaluation_prompts
 from marey.checks.rates import mean_quality
+from marey.core.whole_files import whole_file
 from marey.generation.port import Generator, S
 from marey.text.features import TextFeatures
 from marey.training.adherence import measure, pipeline_of
@@ -101,9 +102,8 @@ def compare(
         file = output / name / f"{file_name(variant)}.{seed}.json"
         if not file.is_file():
             text = json.dumps(dict(measured(variant, seed)), indent=1)
-            temporary = file.with_suffix(".part")
-            temporary.write_text(text, encoding="utf-8")
-            temporary.replace(file)
+            with whole_file(file, alone=True) as part:
+                part.write_text(text, encoding="utf-8")
         results.setdefault(variant, []).append(json.loads(file.read_text(encoding="utf-8")))
         (output / f"{name}.md").write_text(table(results), encoding="utf-8")
 

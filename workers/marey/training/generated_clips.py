@@ -15,6 +15,7 @@ from safetensors.torch import load_file, save_file
 from torch import Tensor
 
 from marey.core.errors import InvalidFile
+from marey.core.whole_files import whole_file
 from marey.data.manifest import Clip
 from marey.data.prepared import PreparedData
 from marey.nn.motion_tokenizer import MotionTokenizer
@@ -63,9 +64,8 @@ class Drawn:
             "lengths": self.lengths,
             "tokens": self.tokens.short(),
         }
-        temporary = (run / FILE).with_suffix(".part")
-        save_file(tensors, temporary, metadata={"key": _key(tokenizer, prepared)})
-        temporary.replace(run / FILE)
+        with whole_file(run / FILE, alone=True) as part:
+            save_file(tensors, part, metadata={"key": _key(tokenizer, prepared)})
 
     def extend(self, clips: Sequence[Clip], tokens: TokenData, captions: C) -> tuple[list[Clip], TokenData, C]:
         """Append these motions to clips, tokens and captions."""

@@ -18,6 +18,7 @@ from safetensors.torch import load_file, save_file
 from torch import Tensor, nn
 
 from marey.core.errors import InvalidFile, InvalidInput
+from marey.core.whole_files import whole_file
 from marey.data.manifest import Clip
 from marey.data.prepared import PreparedData
 from marey.nn import distributed
@@ -226,9 +227,8 @@ def made_once(
         values = {name: value.int() for name, value in made.items()}
         values["tokens"] = made["tokens"].to(torch.int16)
         values["key"] = torch.tensor(list(key.encode()), dtype=torch.uint8)
-        temporary = file.with_suffix(".part")
-        save_file({name: value.cpu().contiguous() for name, value in values.items()}, temporary)
-        temporary.replace(file)
+        with whole_file(file, alone=True) as part:
+            save_file({name: value.cpu().contiguous() for name, value in values.items()}, part)
     return made
 
 

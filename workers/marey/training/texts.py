@@ -26,6 +26,7 @@ from marey.core.documents import parse_json
 from marey.core.errors import InvalidFile, InvalidInput, NotFound
 from marey.core.hashing import sha256_of
 from marey.core.validation import first_problem
+from marey.core.whole_files import whole_file
 from marey.data.manifest import CLIPS, TEXTS
 from marey.data.prepared import PreparedData
 from marey.text.graph import EDGE_TYPES, LEVELS, MA, OTHERS, SemanticGraph
@@ -217,8 +218,7 @@ class CaptionTexts:
 
     def save(self, folder: Path) -> None:
         """Write `texts.npz` into a prepared folder."""
-        temporary = folder / f".{TEXTS}.part"
-        with temporary.open("wb") as file:
+        with whole_file(folder / TEXTS, alone=True) as part, part.open("wb") as file:
             np.savez_compressed(
                 file,
                 strings=self.strings,
@@ -231,7 +231,6 @@ class CaptionTexts:
                 spec=np.array(self.spec.model_dump_json()),
                 clips_sha256=np.array(sha256_of(folder / CLIPS)),
             )
-        temporary.replace(folder / TEXTS)
 
     @classmethod
     def load(cls, data: PreparedData) -> CaptionTexts:

@@ -6,10 +6,10 @@ import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from importlib.metadata import version
 from typing import Any, Protocol
 
 from marey.core.errors import InvalidInput
+from marey.core.package import own_version
 from marey.motion.clip import QUALITY, SELECTION, MotionClip, load_npz
 from marey.motion.edits.licences import strictest
 from marey.motion.edits.operation import MOST_FRAMES
@@ -166,5 +166,5 @@ def _provenance(
 ) -> dict[str, Any]:
     licence = strictest([*(each.clip.manifest.get("licence") for each in sources), *terms])
     unique = {each.record["sha256"]: each.record for each in sources}
-    record = {"sources": [*unique.values()], "ops": [*done], "software": {"marey": version("marey")}}
+    record = {"sources": [*unique.values()], "ops": [*done], "software": {"marey": own_version()}}
     return {EDITED_FROM: record, **({} if licence is None else {"licence": licence})}

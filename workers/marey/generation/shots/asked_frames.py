@@ -21,22 +21,22 @@ from marey.generation.bearing import BorneSpan, borne_spans, with_bearing
 from marey.generation.bearing_drawing import borne
 from marey.generation.drawn_whole import ALONE
 from marey.generation.fine import FINE
-from marey.generation.footing import RUNS
 from marey.generation.port import GenerationControl, Generator, MotionFeatures, Request, S
 from marey.generation.shots.dispatch import generate_any, resolve_request
 from marey.generation.shots.edit_levels import LevelledFrames, levelled
 from marey.generation.shots.levels import CLIMBS, lifted
 from marey.generation.shots.lifted_steps import between_stances, with_steps
 from marey.generation.shots.provenance import KEY, describe_timeline
-from marey.generation.shots.timelines import RISE, RISE_SPEED, TimelineMotion
+from marey.generation.shots.timelines import RISE_SPEED, TimelineMotion
 from marey.generation.shots.windows import Float32, FrameGap, crossfaded, fill, most_frames, no_text
 from marey.generation.stated import STATED
 from marey.generation.timed import CUT_SHARE, TimedText, part_seed
 from marey.generation.wish import Wish
 from marey.motion.features import FeatureLayout, HeadingLayout
 from marey.motion.skeleton import HUMANML3D
+from marey.quality.postures import RISE
 from marey.text.features import TextFeatures
-from marey.vocabulary.courses import STRAIGHT
+from marey.vocabulary.courses import RUNS, STRAIGHT
 from marey.vocabulary.scope import STANDING
 
 SHORTEST_S = 1.0
@@ -83,7 +83,7 @@ def asks_more(generator: Generator[S], text: TextFeatures, settings: S) -> bool:
     told = (wish.limb, wish.count, wish.metres, wish.side or None, wish.gaze or None)
     return (
         bool(text.movements)
-        or wish.action in _DRAWN | CLIMBS | RUNS.keys()
+        or wish.action in _DRAWN | CLIMBS | RUNS
         or is_stated
         or bool(turns or winds or wish.pace.pace or wish.pace.mood)
         or any(each is not None for each in told)

@@ -20,9 +20,8 @@ from marey.motion.filters import smooth
 from marey.motion.rotations import about, normalize, rotate
 from marey.posing.limbs import FPS, LEVEL
 from marey.posing.standing import ARMS, LEGS, StandingBody, eased
-from marey.quality.record import SHOWN
 from marey.selector.motion import SHORTEST, Motion
-from marey.selector.rules import RULES
+from marey.selector.rules import RULES, is_shown
 
 Float32 = NDArray[np.float32]
 Array = NDArray[np.floating]
@@ -190,7 +189,7 @@ def _shows(features: Float32, layout: FeatureLayout, action: str) -> bool:
     """Return True if features show an action by its rule, or it has none."""
     if action not in RULES:
         return True
-    return len(features) >= SHORTEST and RULES[action](Motion(layout.decode(features), layout.fps), "") >= SHOWN
+    return len(features) >= SHORTEST and is_shown(Motion(layout.decode(features), layout.fps), action)
 
 
 def without_rest(features: Float32, layout: FeatureLayout, action: str = "", *, first: bool, last: bool) -> Float32:

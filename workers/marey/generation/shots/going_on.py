@@ -9,19 +9,18 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.generation.footing import RUNS
 from marey.generation.onward import gone_on_with_strides
-from marey.generation.skidding import skids
 from marey.generation.wish import action_of
 from marey.motion.courses import course_of
 from marey.motion.features import FeatureLayout
 from marey.motion.rotations import Array
-from marey.selector.matching import WAYS, wanted_of
+from marey.selector.matching import wanted_of
 from marey.text.features import TextFeatures
 from marey.vocabulary.bearing_words import stated_bearings
-from marey.vocabulary.courses import ASIDE, QUARTER, STRAIGHT, stated_course
+from marey.vocabulary.courses import ASIDE, QUARTER, RUNS, STRAIGHT, WAYS, stated_course
 from marey.vocabulary.gazes import without_gaze
 from marey.vocabulary.in_place import goes_in_place
+from marey.vocabulary.stops import stated_skid
 
 Float32 = NDArray[np.float32]
 
@@ -44,7 +43,7 @@ WAITS_S = 0.4
 
 def is_way(text: TextFeatures) -> bool:
     """Return True if a text asks for a walk, a run or a leap ahead, and for nothing else."""
-    if goes_in_place(text.said, "walk") or skids(text.said, action_of(text)):
+    if goes_in_place(text.said, "walk") or stated_skid(text.said, action_of(text)):
         return False
     steps = wanted_of(text.actions or (text.rewritten,)) or ()
     return len(steps) == 1 and {each.action for each in steps[0]} <= GOES_ON

@@ -26,10 +26,12 @@ from marey.generation.timed import TimedText, part_seed
 from marey.generation.wish import action_of
 from marey.items.timeline import MIN_ROW_SECONDS
 from marey.text.features import TextFeatures
+from marey.vocabulary.courses import RUNS
 from marey.vocabulary.entries import load_vocabulary
 from marey.vocabulary.gazes import stated_gaze
 from marey.vocabulary.lengths import only_length, stated_length
 from marey.vocabulary.scope import STANDING
+from marey.vocabulary.stops import only_stops
 
 SEED = "movement"
 """Part of the seed by which the length of a movement is drawn."""
@@ -37,15 +39,8 @@ WAITS_S = 2.0
 """Seconds of a body that stands and waits beside other movements."""
 LOOKS_S, STOPS_S = 3.0, (1.0, 1.25)
 """The same of one that looks around, and of one that only stops."""
-_ONLY_STOPS = re.compile(
-    r"(?:(?:he|she|they|it) )?(?:then )?(?:\w+ly )?(?:(?:com\w+|slow\w*|skid\w*) to an? (?:\w+ )?"
-    r"(?:stop|halt|standstill)|(?:stop|halt|freez|paus)\w*)(?: (?:dead|short|there|still|\w+ly))*"
-    r"(?: (?:at|by|before|in front of|on|in) (?:the|a|an|his|her|their|its|place)(?: [\w-]+){0,3})?"
-    r"(?: for an? (?:\w+ )?(?:moment|second|beat|instant))?"
-)
-"""Words of a body that stops and does nothing else."""
-LEAP, RUNS, JUMPS_AHEAD = "leap", frozenset({"run", "sprint"}), frozenset({"jump", "jump-forward", "hop"})
-"""Action of a jump out of a run, those of runs, and those of jumps that may be one."""
+LEAP, JUMPS_AHEAD = "leap", frozenset({"jump", "jump-forward", "hop"})
+"""Action of a jump out of a run, and those of jumps that may be one."""
 _OVER = re.compile(r"\b(?:over|across|clear(?:s|ing))\b")
 _ON_SPOT = re.compile(
     r"\b(?:up and down|in place|on (?:the spot|(?:one|his|her|their|the)(?: \w+)? (?:leg|foot))|straight up|for joy"
@@ -155,7 +150,7 @@ def _drawn_frames(generator: Generator[Any], request: Request, movement: TextFea
     if action_of(movement) != STANDING:
         return frames
     said, rng = movement.said.lower(), random.Random(f"{request.seed} {number} stands")  # noqa: S311
-    stops = _ONLY_STOPS.fullmatch(said.strip(" .!")) is not None
+    stops = only_stops(said.strip(" .!"))
     seconds = rng.uniform(*STOPS_S) if stops else LOOKS_S if stated_gaze(said) else WAITS_S
     return min(frames, generator.limits.within(round(max(seconds, gestures_s(movement.said)) * generator.limits.fps)))
 

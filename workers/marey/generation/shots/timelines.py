@@ -21,7 +21,6 @@ from marey.core.errors import InvalidInput
 from marey.drawing.holds import BACK, CROUCH, FLOOR, FOURS, FRONT, KNEE, KNEES
 from marey.generation.asked import changes_of, generate_as_asked
 from marey.generation.distances import with_distance
-from marey.generation.footing import RUNS
 from marey.generation.passes import PassControl
 from marey.generation.port import GenerationControl, Generator, Limits, NoControl, Request, S
 from marey.generation.postured import MEETS, pass_into
@@ -52,12 +51,14 @@ from marey.generation.wish import action_of
 from marey.items.timeline import TIMELINE_HINT, no_timelines
 from marey.motion.features import FeatureLayout, HeadingLayout
 from marey.motion.skeleton import HUMANML3D
+from marey.quality.postures import RISE
 from marey.text.features import TextFeatures
+from marey.vocabulary.courses import RUNS
 from marey.vocabulary.entries import load_vocabulary
 
-RISE, RISE_SPEED = 0.3, 0.6
-"""Metres, and metres a second: between movements of a sequence whose pelvis is farther apart in height, time is left to
-stand up or to go down at this speed."""
+RISE_SPEED = 0.6
+"""Metres a second: between movements of a sequence whose pelvis is farther apart in height than `RISE`, time is left to
+stand up or to go down at this speed, which is slower than one that is flagged (`marey.quality.postures`)."""
 
 BENT, LOWER = frozenset({"bend-over"}), frozenset({KNEES, KNEE, FLOOR, BACK, FRONT, CROUCH, FOURS})
 """Actions from whose bent trunk a body goes on down, and the postures that it comes to."""

@@ -19,6 +19,7 @@ from torch import Tensor
 
 from marey.core.arrays import check_array, map_npy, read_npz, text_of
 from marey.core.errors import InvalidFile, NotFound
+from marey.core.whole_files import whole_file
 from marey.data.manifest import CLIPS
 from marey.data.prepared import PreparedData
 from marey.models.momaskpp.config import TextConfig
@@ -108,14 +109,10 @@ def _write(folder: Path, captions: Sequence[str], encoder: TextEncoder, config: 
         found += [each.astype(np.float16) for each in states]
     number = {text: i for i, text in enumerate(unique)}
     start = np.concatenate([[0], np.cumsum([len(each) for each in found])]).astype(np.int64)
-    temporary = folder / f".{STATES}.part"
-    with temporary.open("wb") as file:
+    with whole_file(folder / STATES, alone=True) as part, part.open("wb") as file:
         np.save(file, np.concatenate(found))
-    temporary.replace(folder / STATES)
-    temporary = folder / f".{INDEX}.part"
-    with temporary.open("wb") as file:
+    with whole_file(folder / INDEX, alone=True) as part, part.open("wb") as file:
         np.savez(file, start=start, caption=np.array([number[text] for text in captions], np.int64), key=np.array(key))
-    temporary.replace(folder / INDEX)
 
 
 def _key_of(folder: Path) -> str | None:
