@@ -3,16 +3,25 @@ the real format."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import pytest
 import torch
 
 from marey.data.prepared import PreparedData
 from tests.support.prepared import write_prepared
+from tests.support.texts import pipelines_share_parts
 
 
 @pytest.fixture(autouse=True, scope="session")
 def _one_thread() -> None:
     torch.set_num_threads(1)
+
+
+@pytest.fixture(autouse=True, scope="package")
+def _shared_parts() -> Iterator[None]:
+    with pipelines_share_parts():
+        yield
 
 
 @pytest.fixture(scope="session")

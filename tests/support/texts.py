@@ -1,11 +1,20 @@
-"""The parts that read prompts, loaded once in a process of tests: a second each time."""
+"""The parts that read prompts, loaded once in a process of tests: a second each time.
+
+`tests/models` and others let pipelines that are loaded from a manifest have them, too: `pipelines_share_parts`.
+"""
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
 
 from marey.bundles import TextSpec
+from marey.evaluator import sentences
+from marey.text import pipeline
 from marey.text.encoders import TextEncoder
 from marey.text.labellers import OneAtATime
 from marey.text.loading import load_encoder, load_labeller, load_rewriter
@@ -48,6 +57,23 @@ def shared_order_encoder() -> MiniLMEncoder:
 def order_of_time(clauses: Sequence[str], moving: Sequence[bool]) -> tuple[int, ...]:
     """Return the numbers of the clauses that ask for a movement, in the order of time, by the shipped reader."""
     return order_reader().order(clauses, moving, shared_order_encoder().encode)
+
+
+@contextmanager
+def pipelines_share_parts() -> Iterator[None]:
+    """Let pipelines that are loaded meanwhile have the shipped labeller and the shipped encoder from here."""
+
+    def labeller(name: str) -> RoleLabeller:
+        return shared_labeller() if name == "light" else load_labeller(name)
+
+    def encoder(name: str, path: Path | None = None) -> TextEncoder:
+        return shared_encoder() if name == "minilm" and path is None else load_encoder(name, path)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(pipeline, "load_labeller", labeller)
+        for module in (pipeline, sentences):
+            patch.setattr(module, "load_encoder", encoder)
+        yield
 
 
 def shared_pipeline(rewriter: str = "none") -> TextPipeline:

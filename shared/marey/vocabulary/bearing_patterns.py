@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from functools import lru_cache
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 from marey.vocabulary.bearings import ONLY, UNLESS, bearing_macros, bearing_table, bearing_words
 from marey.vocabulary.inflection import forms_of_other, third_person, verb_forms
+from marey.vocabulary.needed_words import Needed, best_of, forms_needed, needed_of_all, needed_words
 from marey.vocabulary.word_lists import load_word_lists
 
 _WALK = "walk"
@@ -26,15 +28,57 @@ DOES = "does"
 _GAIT = re.compile(r"([\w|-]+)(.*)", re.DOTALL)
 
 
+@dataclass(frozen=True)
+class WordsOfBearing:
+    """The words of a field of a bearing.
+
+    Attributes:
+        name: id of the bearing.
+        field: of its table.
+        entries: as they stand in it.
+        needed: one of these stands in each text that has such words; empty = nothing is known of them.
+    """
+
+    name: str
+    field: str
+    entries: Sequence[str]
+    needed: Needed
+
+    @cached_property
+    def patterns(self) -> Sequence[tuple[str, re.Pattern[str]]]:
+        """Kinds and patterns of the words."""
+        return [
+            (kind, re.compile(rf"(?<![\w'-])(?:{pattern})(?![\w'])"))
+            for kind, pattern in _patterns_of(self.field, self.entries)
+        ]
+
+
+def bearing_patterns(text: str) -> Iterator[tuple[str, str, re.Pattern[str]]]:
+    """Yield the id of each bearing, and the kind and the pattern of its words, of all that may match in a text."""
+    for words in words_of_bearings():
+        for needed in words.needed or ("",):
+            if needed in text:
+                yield from ((words.name, *each) for each in words.patterns)
+                break
+
+
 @lru_cache(maxsize=1)
-def bearing_patterns() -> Sequence[tuple[str, str, re.Pattern[str]]]:
-    """Return the id of each bearing, and the kind and the pattern of its words."""
+def words_of_bearings() -> Sequence[WordsOfBearing]:
+    """Return the words of all bearings."""
     return [
-        (name, kind, re.compile(rf"(?<![\w'-])(?:{pattern})(?![\w'])"))
+        WordsOfBearing(name, field, entries, needed_of_all(_needed_by(field, entry) for entry in entries))
         for name, words in bearing_words()
-        for kind, entries in words.items()
-        for kind, pattern in _patterns_of(kind, entries)
+        for field, entries in words.items()
     ]
+
+
+def _needed_by(field: str, entry: str) -> Needed:
+    if field == "by":
+        return best_of(map(needed_words, entry.split(" : ", 1)))
+    if field in ("gaits", "loads"):
+        verbs, tail = _verbs_and_tail(entry)
+        return best_of([needed_of_all(map(forms_needed, verbs)), needed_words(tail)])
+    return needed_words(entry)
 
 
 @lru_cache(maxsize=1)

@@ -201,7 +201,7 @@ def _of_zombies(spans: Sequence[BearingSpan]) -> Iterator[BearingSpan]:
 
 
 def _matches(text: str) -> Iterator[BearingSpan]:
-    for name, kind, pattern in bearing_patterns():
+    for name, kind, pattern in bearing_patterns(text):
         for match in pattern.finditer(text):
             if name in unless_beside() and unless_beside()[name].search(text):
                 break

@@ -57,7 +57,7 @@ def check(estimate: MemoryEstimate, found: int) -> None:
     assert estimate.total == pytest.approx(found, rel=0.1), dict(estimate.parts)
 
 
-@pytest.mark.parametrize(("layers", "width", "samples"), [(3, 64, 12), (5, 96, 6)])
+@pytest.mark.parametrize(("layers", "width", "samples"), [(3, 64, 12), pytest.param(5, 96, 6, marks=pytest.mark.slow)])
 def test_the_estimates_are_within_a_tenth_of_what_is_used(layers: int, width: int, samples: int) -> None:
     config = small(layers, width)
     torch.manual_seed(0)
@@ -65,7 +65,7 @@ def test_the_estimates_are_within_a_tenth_of_what_is_used(layers: int, width: in
     check(residual_memory(config, bf16=False).estimate(samples), measured_residual(config, samples))
 
 
-@pytest.mark.parametrize(("layers", "width", "samples"), [(3, 64, 12), (5, 96, 6)])
+@pytest.mark.parametrize(("layers", "width", "samples"), [pytest.param(3, 64, 12, marks=pytest.mark.slow), (5, 96, 6)])
 def test_fused_attention_is_counted_as_such(layers: int, width: int, samples: int) -> None:
     config = small(layers, width)
     torch.manual_seed(0)

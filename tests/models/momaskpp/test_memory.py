@@ -52,7 +52,8 @@ def test_the_estimate_is_within_a_tenth_of_what_is_used(
 
 
 @pytest.mark.parametrize(
-    ("layers", "width", "samples", "conditioning"), [(3, 64, 8, "cross-attention"), (5, 96, 4, "in-context")]
+    ("layers", "width", "samples", "conditioning"),
+    [(3, 64, 8, "cross-attention"), pytest.param(5, 96, 4, "in-context", marks=pytest.mark.slow)],
 )
 def test_fused_attention_is_counted_as_such(layers: int, width: int, samples: int, conditioning: Conditioning) -> None:
     config = small(layers, width, conditioning)

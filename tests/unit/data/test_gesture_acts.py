@@ -20,7 +20,7 @@ ACTS = ("draw-bow", "push", "throw", "laugh", "fight-stance", "dribble", "signal
 @pytest.fixture(scope="module")
 def made() -> list[Part]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(gestures, "KINDS", {name: few(30)[name] for name in ACTS})
+        patch.setattr(gestures, "KINDS", {name: few(14)[name] for name in ACTS})
         return list(made_gestures([idle(), idle(2.0), idle(content="walk", speed=1.2)]))
 
 

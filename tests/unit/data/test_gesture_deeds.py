@@ -21,7 +21,7 @@ from tests.support.bodies import FPS
 from tests.unit.data.test_gesture_acts import swings
 from tests.unit.data.test_gestures import DEEDS, OTHER, few, idle, tilt
 
-COUNT = 14
+COUNT = 9
 HEAD, HIPS = 15, 0
 KNEE, ANKLE, TOE = {"left": 4, "right": 5}, {"left": 7, "right": 8}, {"left": 10, "right": 11}
 ELBOW, WRIST = {"left": 18, "right": 19}, {"left": 20, "right": 21}

@@ -21,7 +21,7 @@ from marey.posing.still import standing_still
 from tests.support.bodies import FPS
 from tests.unit.data.test_gestures import FALLS, OTHER, few, idle, tilt
 
-COUNT = 24
+COUNT = 12
 HEAD, CHEST, TOES = 15, 9, [10, 11]
 ARMS = [16, 17, 18, 19]
 

@@ -18,7 +18,7 @@ SIDES = ("left", "right")
 @pytest.fixture(scope="module")
 def made() -> list[Part]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(gestures, "KINDS", {name: few(30)[name] for name in FIGHTS})
+        patch.setattr(gestures, "KINDS", {name: few(14)[name] for name in FIGHTS})
         return list(made_gestures([idle(), idle(2.0)]))
 
 

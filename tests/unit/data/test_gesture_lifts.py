@@ -19,7 +19,7 @@ TOP = 0.2
 @pytest.fixture(scope="module")
 def made() -> list[Part]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(gestures, "KINDS", {name: few(30)[name] for name in ("drink", "reach-up", "arm-circles")})
+        patch.setattr(gestures, "KINDS", {name: few(14)[name] for name in ("drink", "reach-up", "arm-circles")})
         return list(made_gestures([idle(), idle(2.0)]))
 
 

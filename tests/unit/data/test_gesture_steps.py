@@ -16,6 +16,7 @@ from marey.data.part import Part
 from tests.support.bodies import FPS, Body
 
 KINDS_OF_STEPS = ("turn-around", "sidestep", "spin", "jump-turn", "climb-stairs", "climb-onto", "climb-ladder")
+COUNT = 9
 APEX = 0.4  # metres
 
 
@@ -44,14 +45,14 @@ def climbs() -> list[Part]:
 @pytest.fixture(scope="module")
 def made() -> list[Part]:
     with pytest.MonkeyPatch.context() as patch:
-        kinds = {action: replace(KINDS[action], count=16) for action in KINDS_OF_STEPS}
+        kinds = {action: replace(KINDS[action], count=COUNT) for action in KINDS_OF_STEPS}
         patch.setattr(gestures, "KINDS", kinds)
         return list(made_gestures([part("idle", Body(4.0).joints()), part("jump", jump()), *climbs()]))
 
 
 def of(made: list[Part], action: str) -> list[Part]:
     found = [part for part in made if part.content == action]
-    assert len(found) == 16
+    assert len(found) == COUNT
     return found
 
 

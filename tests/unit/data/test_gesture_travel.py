@@ -17,6 +17,7 @@ from marey.data.part import Part
 from tests.support.bodies import FPS, Body, steady
 
 KINDS_OF_TRAVEL = ("walk-backward", "run", "sprint", "turn", "walk", "leap", "sneak")
+COUNT = 9
 STANDS = 0.02  # metres over the lowest toe
 
 
@@ -30,14 +31,14 @@ def gait(content: str, speed: float, duty: float, cadence: float) -> Part:
 @pytest.fixture(scope="module")
 def made() -> list[Part]:
     with pytest.MonkeyPatch.context() as patch:
-        kinds = {action: replace(KINDS[action], count=16) for action in KINDS_OF_TRAVEL}
+        kinds = {action: replace(KINDS[action], count=COUNT) for action in KINDS_OF_TRAVEL}
         patch.setattr(gestures, "KINDS", kinds)
         return list(made_gestures([gait("walk", 1.1, 0.62, 1.8), gait("run", 3.2, 0.3, 2.8)]))
 
 
 def of(made: list[Part], action: str) -> list[Part]:
     found = [part for part in made if part.content == action]
-    assert len(found) == 16
+    assert len(found) == COUNT
     return found
 
 

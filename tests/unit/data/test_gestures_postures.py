@@ -18,7 +18,7 @@ from marey.posing.standing import StandingBody
 from tests.support.bodies import FPS
 from tests.unit.data.test_gestures import OTHER, POSTURES, few, idle, tilt
 
-COUNT = 12
+COUNT = 8
 ANKLE, TOE = {"left": 7, "right": 8}, {"left": 10, "right": 11}
 WRISTS = [20, 21]
 

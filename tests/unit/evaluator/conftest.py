@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import pytest
 
 from marey.bundles import Bundle
@@ -14,8 +16,15 @@ from marey.evaluator.train import train_stage
 from marey.training.budget import Budget
 from marey.training.staging import TrainOptions
 from tests.support.prepared import write_prepared
+from tests.support.texts import pipelines_share_parts
 
 ACTS = tuple(f"{verb} {place}" for verb in ("walks", "runs", "waves", "bows") for place in ("here", "there", "away"))
+
+
+@pytest.fixture(autouse=True, scope="package")
+def _shared_parts() -> Iterator[None]:
+    with pipelines_share_parts():
+        yield
 
 
 @pytest.fixture(scope="package")

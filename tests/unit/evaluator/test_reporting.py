@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import shlex
+from collections.abc import Iterator
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from uuid import uuid4
@@ -14,6 +15,7 @@ import pytest
 from marey.core.errors import InvalidFile, InvalidInput, NotFound
 from marey.data.prepared import PreparedData
 from marey.evaluations import EarlierRun, EvaluationJob, EvaluationRequest, MadeItem
+from marey.evaluator import scoring
 from marey.evaluator.measuring import (
     TOGETHER,
     Broken,
@@ -38,6 +40,14 @@ from marey.quality.limits import expected_of
 from marey.runtime.scoring import ScoreInput
 
 NOON = datetime(2026, 11, 2, 12, tzinfo=UTC)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _few_subsets() -> Iterator[None]:
+    """Let KID draw few subsets: of as many motions as a subset holds, all are the same."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(scoring, "KID_SUBSETS", 2)
+        yield
 
 
 def sha256(data: bytes) -> str:

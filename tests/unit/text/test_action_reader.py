@@ -27,6 +27,9 @@ from marey.text.parsed import without_punctuation
 from marey.vocabulary.entries import load_vocabulary
 from tests.support.texts import shared_encoder, shared_reading_encoder
 
+EVERY = pytest.mark.parametrize("every", [4, pytest.param(1, marks=pytest.mark.slow)])
+"""Of so many prompts, one is read: rates of all take seconds."""
+
 
 def read(prompts: Sequence[str]) -> list[ReadAction]:
     vectors = shared_reading_encoder().pooled([without_punctuation(prompt) for prompt in prompts])
@@ -50,8 +53,9 @@ def test_it_reads_what_no_list_of_words_has(prompt: str, action: str) -> None:
     assert read([prompt])[0].action == action
 
 
-def test_nine_of_ten_prompts_of_one_action_are_read_right() -> None:
-    prompts = development_prompts()
+@EVERY
+def test_nine_of_ten_prompts_of_one_action_are_read_right(every: int) -> None:
+    prompts = development_prompts()[::every]
     found = read([prompt.text for prompt in prompts])
     right = sum(each.name == prompt.actions[0] for each, prompt in zip(found, prompts, strict=True))
     wrong = sum(each.action not in (None, *prompt.actions) for each, prompt in zip(found, prompts, strict=True))
@@ -59,9 +63,10 @@ def test_nine_of_ten_prompts_of_one_action_are_read_right() -> None:
     assert wrong <= 0.03 * len(prompts)
 
 
-def test_few_others_are_read_as_one_action() -> None:
-    several = [each.action for each in read([text for text, _ in sequence_prompts()])]
-    outside = [each.action for each in read(outside_prompts())]
+@EVERY
+def test_few_others_are_read_as_one_action(every: int) -> None:
+    several = [each.action for each in read([text for text, _ in sequence_prompts()[::every]])]
+    outside = [each.action for each in read(outside_prompts()[::every])]
     assert sum(action is not None for action in several) <= 0.2 * len(several)
     assert sum(action is not None for action in outside) <= 0.1 * len(outside)
 

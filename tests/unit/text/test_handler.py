@@ -21,6 +21,7 @@ from marey.text.keys import feature_key, resolve, scope_key
 from marey.text.several import SeveralTexts, several_key
 from marey.text_service.handler import TextHandler, create_handler
 from marey.vocabulary.scope import ActionLists, ScopePolicy
+from tests.support.texts import pipelines_share_parts
 
 
 def write_bundle(path: Path, text: TextSpec | None, actions: ActionLists | None = None) -> str:
@@ -31,6 +32,12 @@ def write_bundle(path: Path, text: TextSpec | None, actions: ActionLists | None 
             licence="MIT", actions=actions,
         )  # fmt: skip
     return str(path)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _shared_parts() -> Iterator[None]:
+    with pipelines_share_parts():
+        yield
 
 
 @pytest.fixture(scope="module")

@@ -101,7 +101,7 @@ class Stretch:
     @cached_property
     def running(self) -> bool:
         """Return True if the travel is a run."""
-        return is_run(self.joints, self.fps)
+        return is_run(self.joints, self.fps, self.gait)
 
     @cached_property
     def bend(self) -> float:
@@ -165,13 +165,18 @@ def _swings(moved: Array, margin: float, least: float, fps: float) -> int:
     return turning_points(moved @ axes[0], least)
 
 
-def is_run(joints: Array, fps: float) -> bool:
+def is_run(joints: Array, fps: float, body: GaitMeasures | None = None) -> bool:
     """Return True for running: during a share of the time no foot is on the floor (almost none in a walk).
 
     A foot stands while its ankle or toe is slower than about a third of the body. Between 1 and 8 % (a shuffle of an
     old runner, a lively walk) the knees decide: walkers stretch one leg nearly at all times, runners none.
+
+    Args:
+        joints: (T, 22, 3) metres.
+        fps: frames a second.
+        body: their travel, where it is known.
     """
-    body = gait(joints, fps)
+    body = body or gait(joints, fps)
     if body.speed < 0.9:
         return False
     points = joints[:, [*ANKLES, *TOES]]
