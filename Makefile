@@ -45,7 +45,9 @@ test-all: $(STAMP) ## Lint, and every test
 	$(TOGETHER) lint pytest SELECT="-m ''"
 
 # One thread of numpy and torch a process: two that wait for each other take a third more of both cores.
+# In a fresh checkout a process compiles the tests for all four: each would rewrite the same thousand modules.
 pytest: $(STAMP)
+	test -d tests/__pycache__ || $(BIN)/pytest -q --collect-only >/dev/null || true
 	OMP_NUM_THREADS=1 $(BIN)/pytest -q $(PARALLEL) $(SELECT)
 
 # Each in an environment of its own: they need other versions of numpy than Marey, and bpy exists for Python 3.11 alone.

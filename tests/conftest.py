@@ -101,6 +101,19 @@ def pytest_configure(config: pytest.Config) -> None:
             )
 
 
+FEW_SEEDS = 2
+"""Of those that a test is parametrised with, in the fast tests: the others are `slow`."""
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the further seeds of `@pytest.mark.parametrize("seed", …)` as slow."""
+    for item in items:
+        seeds = any(mark.args[:1] == ("seed",) for mark in item.iter_markers("parametrize"))
+        if seeds and isinstance(item, pytest.Function) and item.callspec.indices["seed"] >= FEW_SEEDS:
+            item.add_marker(pytest.mark.slow)
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Iterator[None]:
     """Collect no garbage while tests are collected, nor look at all that they are in each collection to come: not once

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from multiprocessing import get_context
+from multiprocessing.context import ForkServerContext
 from pathlib import Path
 from typing import Any
 
@@ -68,17 +69,23 @@ def test_the_part_of_a_model_is_as_recorded(model: str) -> None:
     assert differences({name: known[name] for name in found}, found) == [], HINT
 
 
+@pytest.fixture(scope="module")
+def fresh() -> ForkServerContext:
+    """Forks of a process that has imported what a motion needs, and computed nothing."""
+    context = get_context("forkserver")
+    context.set_forkserver_preload(["tests.contracts.motions", "marey.generate.oneshot"])
+    return context
+
+
 @pytest.mark.parametrize(("model", "name"), MOTIONS)
-def test_a_motion_of_a_shipped_bundle_is_as_recorded(model: str, name: str) -> None:
+def test_a_motion_of_a_shipped_bundle_is_as_recorded(model: str, name: str, fresh: ForkServerContext) -> None:
     """Bit for bit on the kind of processor it was recorded on; elsewhere its length and its keys.
 
     There a sum is added in another order, which may draw another token.
     """
     known = recorded_of(model)["motions"][name]
-    with get_context("spawn").Pool(
-        1
-    ) as fresh:  # in a process that reads many texts, MiniLM is compiled: other last bits
-        found = fresh.apply(motion, (name,))
+    with fresh.Pool(1) as pool:  # in a process that reads many texts, MiniLM is compiled: other last bits
+        found = pool.apply(motion, (name,))
     assert found["frames"] == known["frames"]
     assert found["manifest"] == known["manifest"]
     if recorded_of(model)["processor"] == processor():

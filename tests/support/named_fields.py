@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Set
 from typing import Any
 
 import requests
 from schemathesis import Case, Response
 from schemathesis.checks import CheckContext
+from schemathesis.schemas import APIOperation
 
 from marey.http.queries import LONGEST_NAME
 
@@ -20,27 +21,43 @@ OF_PYDANTIC = re.compile(
 )
 
 
+_declared: dict[str, frozenset[str]] = {}
+"""By the label of an operation: see `_of_operation`."""
+
+
 def names_the_field(_context: CheckContext, response: Response, case: Case) -> None:
     """Fail unless each problem names a parameter, a header, or a field of the body as sent or as documented, in words
     that are not those of pydantic."""
     if response.status_code not in REFUSALS:
         return
     problem = json.loads(response.content)
-    known = {name.lower() for name in (*OF_ANY, *_parameters(case), *_documented(case), *_sent(response.request))}
     told = problem.get("problems") or [{"field": name} for name in (problem.get("where") or "").split(", ")]
     assert problem["detail"], problem
     assert not OF_PYDANTIC.search(response.text), problem
-    for each in told:
-        field, line = each.get("field"), each.get("line")
-        named = line is not None if field is None else _leads(field.lower(), known)
-        if field and each.get("message", "").startswith("is missing"):  # of an element that is free in form
-            named = named or _leads(field.lower().rpartition(".")[0], known)
-        if response.status_code == 409 or problem["type"].endswith(":idempotency-mismatch"):
-            named = named or bool(field)  # about what stands there: its kind and id
-        assert named, f"{field!r} (line {line}) is no field of the request: {problem}"
+    of_state = response.status_code == 409 or problem["type"].endswith(":idempotency-mismatch")
+    known = _of_operation(case.operation) | {name[:LONGEST_NAME].lower() for name in case.query or {}}
+    unknown = [each for each in told if not _is_named(each, known, of_state)]
+    if unknown:  # the body is read only if it may hold the name
+        known |= {name.lower() for name in _sent(response.request)}
+    for each in unknown:
+        assert _is_named(each, known, of_state), f"{each} names no field of the request: {problem}"
 
 
-def _leads(path: str, known: set[str]) -> bool:
+def _is_named(told: dict[str, Any], known: Set[str], of_state: bool) -> bool:
+    """Return True if a problem names a line or one of the known fields.
+
+    Args:
+        of_state: the problem is about what stands there: it names its kind and id.
+    """
+    field = told.get("field")
+    if field is None:
+        return told.get("line") is not None
+    path = field.lower()
+    missing = bool(field) and told.get("message", "").startswith("is missing")  # perhaps of one that is free in form
+    return (of_state and bool(field)) or _leads(path, known) or (missing and _leads(path.rpartition(".")[0], known))
+
+
+def _leads(path: str, known: Set[str]) -> bool:
     """Return True if a dotted path consists of known names and numbers of elements."""
     if path in known or path.isdecimal():
         return True
@@ -51,18 +68,14 @@ def _leads(path: str, known: set[str]) -> bool:
     return _leads(path[len(head) + 1 :], known)
 
 
-def _parameters(case: Case) -> Iterator[str]:
-    for parameter in case.operation.iter_parameters():
-        yield parameter.name
-    for name in case.query or {}:  # also one that the route does not know
-        yield name[:LONGEST_NAME]
-
-
-def _documented(case: Case) -> Iterator[str]:
-    """Names of the properties of its bodies, at any depth."""
-    for body in case.operation.body:
-        yield from _properties(body.definition)
-        yield from _properties(body.optimized_schema)
+def _of_operation(operation: APIOperation[Any, Any, Any, Any]) -> frozenset[str]:
+    """Return what an operation declares: its parameters, and the properties of its bodies at any depth."""
+    if operation.label not in _declared:
+        names = {parameter.name for parameter in operation.iter_parameters()}
+        for body in operation.body:
+            names.update(_properties(body.definition), _properties(body.optimized_schema))
+        _declared[operation.label] = frozenset(name.lower() for name in OF_ANY | names)
+    return _declared[operation.label]
 
 
 def _properties(schema: Any) -> Iterator[str]:
@@ -79,7 +92,7 @@ def _properties(schema: Any) -> Iterator[str]:
 def _sent(request: requests.PreparedRequest) -> Iterator[str]:
     """Names in the body, also as a message shows those that hold what cannot be printed."""
     content = request.body if isinstance(request.body, bytes) else (request.body or "").encode()
-    for line in (content, *content.split(b"\n")):
+    for line in dict.fromkeys((content, *content.split(b"\n"))):
         try:
             document = json.loads(line)
         except (ValueError, RecursionError):

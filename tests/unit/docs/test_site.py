@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 import subprocess
 import sys
 from html.parser import HTMLParser
@@ -120,11 +119,19 @@ def test_the_reference_has_every_field_of_every_configuration(out: Path) -> None
         assert sum(not about for _, about in rows) < len(rows) / 4, "nearly all say what they mean"
 
 
-def test_a_broken_anchor_fails_the_build(out: Path, tmp_path: Path) -> None:
-    shutil.copytree(out / "pages", tmp_path / "pages")
-    with (tmp_path / "pages" / "results.md").open("a", encoding="utf-8") as page:
-        page.write("\n[there](reference/settings.md#no-such-heading)\n")
-    assert builder().zensical(tmp_path) != 0
+def test_a_broken_anchor_fails_the_build(tmp_path: Path) -> None:
+    """Of a site of two pages, with the settings of the whole one: that takes seconds."""
+    build, pages = builder(), tmp_path / "pages"
+    build.ROOT = tmp_path / "root"
+    build.ROOT.mkdir()
+    settings, nav, _ = (ROOT / "mkdocs.yml").read_text(encoding="utf-8").partition("\nnav:\n")
+    assert nav
+    (build.ROOT / "mkdocs.yml").write_text(settings, encoding="utf-8")
+    (pages / "reference").mkdir(parents=True)
+    (pages / "reference" / "settings.md").write_text("# Settings\n\n## The port\n", encoding="utf-8")
+    for name, fails in (("the-port", False), ("no-such-heading", True)):
+        (pages / "index.md").write_text(f"[there](reference/settings.md#{name})\n", encoding="utf-8")
+        assert (build.zensical(tmp_path) != 0) == fails, name
 
 
 @pytest.mark.parametrize("broken", ["[a](no-such-page.md)", "![a](no-such-picture.png)", "[a](../../no-such-file.py)"])
