@@ -208,3 +208,14 @@ def test_a_deep_page_is_read_from_its_index_in_order(engine: sa.Engine, database
     own.dispose()
     for index in DEEP:
         assert any(f"Backward using {index} on" in plan for plan in plans), f"{index}\n" + "\n\n".join(plans)
+
+
+@pytest.mark.parametrize("name", ["jobs", "audit"])
+def test_a_page_holds_fifty_unless_another_size_is_asked_for(engine: sa.Engine, name: str) -> None:
+    listing, make = listings(engine)[name]
+    for n in range(51):
+        make(n)
+    with transaction(engine) as conn:
+        page = listing(conn, DEFAULT_TENANT)
+        assert (len(page.rows), page.cursor is None) == (50, False)
+        assert listing(conn, DEFAULT_TENANT, cursor=page.cursor).rows

@@ -10,9 +10,9 @@ import sqlalchemy as sa
 
 from marey.core.errors import InvalidInput, Unreachable
 from marey.db import Listener, Notification, create_engine, transaction, upgrade
-from marey.db.connections import DeadlineConnection
+from marey.db.connections import DeadlineConnection, group_of
 from marey.db.database import EVENT_CHANNEL
-from marey.db.deadlines import KINDS, ORDINARY, Deadline
+from marey.db.deadlines import KINDS, ORDINARY, PING_SECONDS, Deadline
 from marey.db.listener import _connect  # pyright: ignore[reportPrivateUsage]
 from marey.embedded import start_postgres
 from marey.jobs import get_job, sweep
@@ -56,6 +56,26 @@ def test_a_transaction_waits_for_answers_as_long_as_its_kind_says(engine: sa.Eng
         driver = conn.connection.driver_connection
         assert isinstance(driver, DeadlineConnection)
         assert driver.limit == ORDINARY.answer
+    assert driver.limit == PING_SECONDS, "the check before its next use is short"
+
+
+def test_the_session_of_a_connection_that_broke_is_known_as_lost(engine: sa.Engine) -> None:
+    def use_a_cut_one() -> None:
+        with transaction(engine) as conn:
+            driver = conn.connection.driver_connection
+            assert isinstance(driver, DeadlineConnection)
+            drivers.append(driver)
+            with transaction(engine) as other:
+                other.execute(sa.text("SELECT pg_terminate_backend(:pid, 5000)"), {"pid": driver.info.backend_pid})
+            conn.execute(sa.text("SELECT 1"))
+
+    drivers: list[DeadlineConnection] = []
+    with pytest.raises(Unreachable):
+        use_a_cut_one()
+    assert drivers[0].closed
+    assert drivers[0].session in group_of(engine.url)._lost
+    with transaction(engine) as conn:
+        assert conn.execute(sa.text("SELECT 1")).scalar_one() == 1
 
 
 def test_a_database_without_room_says_so_and_names_no_file_of_its_own(engine: sa.Engine) -> None:

@@ -384,7 +384,7 @@ def test_a_retryable_error_waits_counts_and_ends_dead(engine: sa.Engine) -> None
         assert nothing_for(engine)
         assert sweep(engine).items_due == 0
         make_due(engine)
-        sweep(engine)
+        assert sweep(engine).items_due == (len(delays) < 3)
     assert 4 < delays[0] <= 5 < 9 < delays[1] <= 10
     with transaction(engine) as conn:
         assert get_job(conn, "default", job).dead == 1

@@ -152,7 +152,8 @@ def test_a_running_job_is_told_to_fail_early_and_does_at_once_if_too_much_has_fa
         for share in (-0.1, 1.1, float("nan")):
             with pytest.raises(InvalidInput, match="not a share"):
                 set_fail_early(conn, "default", job, share)
-        assert set_fail_early(conn, "default", job, 0.5).ready == 4
+        for share in (1.0, 0.5):
+            assert set_fail_early(conn, "default", job, share).ready == 4
         assert set_fail_early(conn, "default", job, None).fail_early is None
         row = set_fail_early(conn, "default", job, 0.1, "it is dear")
         assert (row.fail_early, row.ready, row.cancelled, row.state) == (0.1, 0, 4, JobState.PARTIAL)
@@ -160,6 +161,17 @@ def test_a_running_job_is_told_to_fail_early_and_does_at_once_if_too_much_has_fa
         assert "fails early above a share of 0.1: it is dear" in told
         assert "1 of 8 items failed, more than the share of 0.1 allowed" in told
         assert audit(conn) == []
+
+
+@pytest.mark.parametrize("left", [0, 1])
+def test_failing_early_cancels_the_last_open_item_and_nothing_of_a_job_without_one(
+    engine: sa.Engine, left: int
+) -> None:
+    job = finish(engine, failed=1, succeeded=1, left=left)
+    with transaction(engine) as conn:
+        row = set_fail_early(conn, "default", job, 0.0)
+        assert (row.ready, row.cancelled, row.state) == (0, left, JobState.PARTIAL)
+        assert [event.kind for event in events_after(conn, "default", job)].count("cancelled") == left
 
 
 def test_delete_takes_everything_of_an_ended_job_and_of_no_other(engine: sa.Engine) -> None:

@@ -15,6 +15,7 @@ from marey.tenants import (
     authenticate,
     check_key,
     create_key,
+    keys_named,
     list_keys,
     revoke_key,
     rotate_key,
@@ -181,3 +182,16 @@ def test_a_key_of_a_suspended_tenant_opens_nothing(engine: sa.Engine) -> None:
 def test_a_rate_that_cannot_be_is_refused(engine: sa.Engine, rates: dict[str, str]) -> None:
     with transaction(engine) as conn, pytest.raises(InvalidInput, match="rates"):
         create_key(conn, "ci", SCOPES, rates=rates)
+
+
+def test_a_name_is_taken_by_keys_that_are_neither_revoked_nor_expired(engine: sa.Engine) -> None:
+    with transaction(engine) as conn:
+        unending, ending, revoked, expired = (
+            create_key(conn, "ci", {"read"}, lifetime=lifetime).key.id for lifetime in (None, DAY, None, DAY)
+        )
+        create_key(conn, "other", {"read"})
+        revoke_key(conn, "default", revoked)
+    pass_time(engine, 2 * DAY, expired)
+    with transaction(engine) as conn:
+        assert {key.id for key in keys_named(conn, "default", "ci")} == {unending, ending}
+        assert keys_named(conn, new_tenant(engine), "ci") == []

@@ -41,7 +41,7 @@ from marey.tenants import (
     suspend_tenant,
     usage,
 )
-from marey.tenants.quotas import EXPECTED_BYTES
+from marey.tenants.quotas import EXPECTED_BYTES, reserve_bytes, reserve_quotas
 from tests.servers.audit import audit
 from tests.servers.jobs import (
     claim_some,
@@ -366,3 +366,17 @@ def test_a_tenant_of_many_jobs_has_no_more_than_one_of_a_single_job(engine: sa.E
     parse_texts(engine)
     taken = [claim_some(engine, limit=1).tenant for _ in range(10)]
     assert taken.count(tenant) == 5
+
+
+@pytest.mark.parametrize("reserve", [reserve_quotas, reserve_bytes])
+def test_nothing_waits_for_a_tenant_without_quotas(
+    engine: sa.Engine, reserve: Callable[[sa.Connection, str, int], None]
+) -> None:
+    free, bound = new_tenant(engine), new_tenant(engine, "bound", queued=10, bytes=10 * EXPECTED_BYTES)
+    with transaction(engine) as first, transaction(engine) as second:
+        second.execute(sa.text("SET LOCAL lock_timeout = 50"))
+        for tenant in (free, bound):
+            reserve(first, tenant, 1)
+        reserve(second, free, 1)
+        with pytest.raises(sa.exc.OperationalError, match="lock timeout"):
+            reserve(second, bound, 1)

@@ -457,3 +457,24 @@ def test_a_worker_that_was_not_seen_for_a_day_is_forgotten(engine: sa.Engine) ->
     sweep(engine)
     with transaction(engine) as conn:
         assert [row.id for row in list_workers(conn)] == [f"b/{QUEUE}"]
+
+
+def test_a_new_scheduler_takes_the_place_of_silent_ones_and_of_no_worker(engine: sa.Engine) -> None:
+    live(engine, "a", "b")
+    with transaction(engine) as conn:
+        for name in ("old", "beside"):
+            record_scheduler_heartbeat(conn, name, host="here", pid=2)
+        conn.execute(
+            sa.text("UPDATE worker SET seen_at = seen_at - interval '1 hour' WHERE id LIKE 'a/%' OR id = 'old'")
+        )
+    found = {row.id: row for row in schedulers(engine)}
+    assert {name: row.live for name, row in found.items()} == {"old": False, "beside": True}
+    assert 3600 <= found["old"].silence < 3700
+    assert 0 <= found["beside"].silence < 100
+    with transaction(engine) as conn:
+        record_scheduler_heartbeat(conn, "beside", host="here", pid=2)
+    assert len(schedulers(engine)) == 2, "it is known"
+    with transaction(engine) as conn:
+        record_scheduler_heartbeat(conn, "new", host="there", pid=3)
+        assert {row.id for row in list_workers(conn)} == {f"a/{QUEUE}", f"b/{QUEUE}"}
+    assert [(row.id, row.host, row.pid) for row in schedulers(engine)] == [("new", "there", 3), ("beside", "here", 2)]

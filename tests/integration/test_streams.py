@@ -316,7 +316,9 @@ def test_a_reader_waits_for_a_frame_that_comes(client: redis.Redis, queue_url: s
 def test_a_reader_that_waits_in_vain_gets_nothing(client: redis.Redis) -> None:
     stream = new_stream(client)
     assert stream.reader(7).read() == []
+    began = time.monotonic()
     assert stream.reader(7).read(block_ms=20) == []
+    assert time.monotonic() - began >= 0.02
 
 
 def test_a_reader_beside_the_writer_gets_every_frame_once(client: redis.Redis, queue_url: str) -> None:

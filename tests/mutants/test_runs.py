@@ -186,6 +186,18 @@ def test_a_table_is_held_to_the_migrated_schema(tmp_path: Path) -> None:
         assert Selector(tmp_path, known).select(mutation) == [f"{file}::test_same"]
 
 
+def test_a_test_of_every_function_comes_before_more_cases_of_one(tmp_path: Path) -> None:
+    path, file = "shared/marey/toy/sums.py", "tests/unit/test_sums.py"
+    (tmp_path / path).parent.mkdir(parents=True)
+    (tmp_path / path).write_text("def add(x):\n    return x + 1\n")
+    cases = {f"{file}::test_quick[{n}]": RecordedTest(file, 4.0 + n / 8, (), passed=True) for n in range(5)}
+    tests = {**cases, f"{file}::test_slow": RecordedTest(file, 9.0, (), passed=True)}
+    known = LineMap("", tests, {}, {path: {2: sorted(tests)}})
+    (mutation,) = (each for each in mutations(path, (tmp_path / path).read_bytes()) if each.kind == "arithmetic")
+    chosen = Selector(tmp_path, known).select(mutation)
+    assert chosen == [f"{file}::test_quick[0]", f"{file}::test_quick[1]", f"{file}::test_slow"]
+
+
 def test_the_map_is_read_as_it_was_written(tmp_path: Path, known: LineMap) -> None:
     known.save(tmp_path / "map.json")
     again = LineMap.load(tmp_path / "map.json")

@@ -23,6 +23,8 @@ import sqlalchemy as sa
 from marey.core.errors import InvalidInput
 from marey.db.tables import Id, Time
 
+PAGE = 50
+"""Rows of a page where no other number is asked for."""
 LARGEST_PAGE = 1000
 SEPARATOR = "|"
 _PADDED = re.compile(r"[^=]+=*|=+")

@@ -14,7 +14,7 @@ import sqlalchemy as sa
 from sqlalchemy.dialects.postgresql import insert
 
 from marey.core.errors import Conflict, InvalidInput, NotFound
-from marey.db.pages import Order, Page, cut_page, mark_of, page_limit
+from marey.db.pages import PAGE, Order, Page, cut_page, mark_of, page_limit
 from marey.db.sql import CLOCK, check_text
 from marey.evaluations import tables
 from marey.evaluations.states import EVALUATION_TRANSITIONS, OPEN_EVALUATIONS, EvaluationState
@@ -131,7 +131,7 @@ def list_evaluations(
     schedule: UUID | None = None,
     states: Collection[EvaluationState] = (),
     cursor: str | None = None,
-    limit: int = 50,
+    limit: int = PAGE,
 ) -> Page[EvaluationRow]:
     """Return evaluations, newest first, optionally of a schedule or in the given states."""
     table = tables.evaluation.c

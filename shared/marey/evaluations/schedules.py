@@ -11,7 +11,7 @@ import sqlalchemy as sa
 
 from marey.core.errors import InvalidInput, NotFound
 from marey.db.ids import new_id
-from marey.db.pages import Order, Page
+from marey.db.pages import PAGE, Order, Page
 from marey.db.sql import CLOCK, check_text, need_row
 from marey.evaluations import tables
 from marey.evaluations.cron import check_cron, check_zone, last_time, next_time
@@ -58,7 +58,7 @@ def get_schedule(conn: sa.Connection, tenant: str, schedule: UUID) -> ScheduleRo
 
 
 def list_schedules(
-    conn: sa.Connection, tenant: str, *, cursor: str | None = None, limit: int = 50
+    conn: sa.Connection, tenant: str, *, cursor: str | None = None, limit: int = PAGE
 ) -> Page[ScheduleRow]:
     """Return schedules, newest first."""
     table = tables.schedule.c

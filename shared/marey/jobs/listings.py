@@ -8,7 +8,7 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from marey.db.pages import Order, Page, cut_page, page_limit, read_cursor
+from marey.db.pages import PAGE, Order, Page, cut_page, page_limit, read_cursor
 from marey.db.sql import among, need_row
 from marey.items.item import SPEC_FIELDS
 from marey.jobs import tables
@@ -29,7 +29,7 @@ def get_job(conn: sa.Connection, tenant: str, job: UUID) -> JobRow:
 
 
 def list_jobs(
-    conn: sa.Connection, tenant: str, *, states: Collection[JobState] = (), cursor: str | None = None, limit: int = 50
+    conn: sa.Connection, tenant: str, *, states: Collection[JobState] = (), cursor: str | None = None, limit: int = PAGE
 ) -> Page[JobRow]:
     """Return jobs, newest first, optionally in the given states."""
     table = tables.job.c

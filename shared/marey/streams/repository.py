@@ -16,7 +16,7 @@ from sqlalchemy.dialects.postgresql import insert
 
 from marey.core.errors import Busy, NotFound
 from marey.db.ids import new_id
-from marey.db.pages import Order, Page
+from marey.db.pages import PAGE, Order, Page
 from marey.db.sql import CLOCK, check_text, interval, need_row
 from marey.jobs import tables as job_tables
 from marey.jobs.submit import submit
@@ -92,7 +92,7 @@ def get_stream(conn: sa.Connection, tenant: str, stream: UUID) -> StreamRow:
 
 
 def list_streams(
-    conn: sa.Connection, tenant: str, *, is_open: bool = False, cursor: str | None = None, limit: int = 50
+    conn: sa.Connection, tenant: str, *, is_open: bool = False, cursor: str | None = None, limit: int = PAGE
 ) -> Page[StreamRow]:
     """Return streams, newest first; with `is_open` only open ones."""
     table = tables.stream.c

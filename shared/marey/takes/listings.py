@@ -6,7 +6,7 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from marey.db.pages import Page, cursor_at, mark_of, page_limit
+from marey.db.pages import PAGE, Page, cursor_at, mark_of, page_limit
 from marey.db.sql import among
 from marey.jobs import tables
 from marey.jobs.listings import get_job
@@ -25,7 +25,7 @@ def list_motions(
     job: UUID | None = None,
     found: MotionFilter = EVERYTHING,
     cursor: str | None = None,
-    limit: int = 50,
+    limit: int = PAGE,
 ) -> Page[MotionRow]:
     """Return motions that match a filter: of a job in creation order; of the whole tenant newest first.
 

@@ -13,7 +13,7 @@ from marey.core.errors import Conflict, NotFound, Unreachable
 from marey.db.database import transaction
 from marey.db.deadlines import MAINTENANCE
 from marey.db.ids import new_id
-from marey.db.pages import Order, Page
+from marey.db.pages import PAGE, Order, Page
 from marey.db.sql import CLOCK, need_row
 from marey.jobs import tables
 from marey.takes.assets import keep_content, write_content
@@ -56,7 +56,7 @@ def add_rig(engine: sa.Engine, store: WritableStore, new: NewRig, actor: Actor, 
     raise Unreachable("garbage collection removed the same new file several times", where="store")
 
 
-def list_rigs(conn: sa.Connection, tenant: str, *, cursor: str | None = None, limit: int = 50) -> Page[RigRow]:
+def list_rigs(conn: sa.Connection, tenant: str, *, cursor: str | None = None, limit: int = PAGE) -> Page[RigRow]:
     """Return rigs, newest first."""
     table = tables.rig.c
     ours = table.tenant_id == tenant

@@ -10,7 +10,7 @@ from uuid import UUID
 import sqlalchemy as sa
 
 from marey.db.ids import new_id
-from marey.db.pages import Order, Page
+from marey.db.pages import PAGE, Order, Page
 from marey.db.sql import CLOCK
 from marey.tenants import tables
 from marey.tenants.types import Actor, AuditRow
@@ -46,7 +46,7 @@ def list_audit(
     verb: str | None = None,
     since: datetime | None = None,
     cursor: str | None = None,
-    limit: int = 50,
+    limit: int = PAGE,
 ) -> Page[AuditRow]:
     """Return recorded actions, newest first, filtered by key, verb and tenant.
 

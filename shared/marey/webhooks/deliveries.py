@@ -15,7 +15,7 @@ import sqlalchemy as sa
 
 from marey.core.errors import Conflict, NotFound
 from marey.db.ids import new_id
-from marey.db.pages import Order, Page
+from marey.db.pages import PAGE, Order, Page
 from marey.db.sql import CLOCK, interval, need_row
 from marey.tenants.audit import audit
 from marey.tenants.types import Actor
@@ -205,7 +205,7 @@ def list_deliveries(
     *,
     states: Collection[DeliveryState] = (),
     cursor: str | None = None,
-    limit: int = 50,
+    limit: int = PAGE,
 ) -> Page[DeliveryRow]:
     """Return deliveries of a webhook, newest event first, optionally in the given states.
 

@@ -10,7 +10,7 @@ import sqlalchemy as sa
 
 from marey.core.errors import Conflict, InvalidInput, NotFound
 from marey.db.ids import new_id
-from marey.db.pages import Order, Page
+from marey.db.pages import PAGE, Order, Page
 from marey.db.sql import CLOCK, check_text, interval, need_row
 from marey.tenants import tables
 from marey.webhooks.tables import webhook, webhook_delivery
@@ -62,7 +62,9 @@ def get_webhook(conn: sa.Connection, tenant: str, identifier: UUID) -> WebhookRo
     return _row(need_row(conn, query, no_such_webhook(identifier)))
 
 
-def list_webhooks(conn: sa.Connection, tenant: str, *, cursor: str | None = None, limit: int = 50) -> Page[WebhookRow]:
+def list_webhooks(
+    conn: sa.Connection, tenant: str, *, cursor: str | None = None, limit: int = PAGE
+) -> Page[WebhookRow]:
     """Return webhooks, newest first."""
     table = webhook.c
     ours = table.tenant_id == tenant

@@ -15,8 +15,8 @@ import sqlalchemy as sa
 from marey.db import transaction
 from marey.motion.body import standard_body
 from marey.motion.skeleton import HUMANML3D
+from marey.streams import get_stream, take_stream
 from marey.streams import tables as stream_tables
-from marey.streams import take_stream
 from marey.streams.control import ControlQueue, StreamControl
 from marey.tenants import tables as tenant_tables
 from tests.support.live_api import LiveApi
@@ -115,6 +115,11 @@ def test_a_worker_that_takes_a_stream_has_been_seen(api: LiveApi, stream: str) -
         assert take_stream(conn, UUID(stream), 1, "hand") is not None
         age = conn.execute(sa.text("SELECT clock_timestamp() - seen_at FROM stream WHERE id = :id"), {"id": stream})
         assert age.scalar_one() < timedelta(minutes=1)
+        started = get_stream(conn, "default", UUID(stream)).started
+        assert started is not None
+    with transaction(api.engine) as conn:
+        assert take_stream(conn, UUID(stream), 2, "another") is not None
+        assert get_stream(conn, "default", UUID(stream)).started == started, "it goes on"
 
 
 def test_a_worker_that_takes_a_stream_while_it_is_deleted_has_it_and_hears_of_that(

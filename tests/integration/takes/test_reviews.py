@@ -78,6 +78,10 @@ def test_said_again_nothing_changes_and_another_verdict_replaces_it(engine: sa.E
     with transaction(engine) as conn:
         assert get_motion(conn, "default", motion) == before
         assert events_after(conn, "default", job) == events
+    say(engine, Review.KEPT, motion, by="cem", comment="very good")
+    with transaction(engine) as conn:
+        row = get_motion(conn, "default", motion)
+        assert (row.reviewed_by, row.review_comment) == ("cem", "very good")
     say(engine, Review.REJECTED, motion, by="bob")
     with transaction(engine) as conn:
         row = get_motion(conn, "default", motion)

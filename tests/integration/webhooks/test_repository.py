@@ -44,7 +44,12 @@ def test_a_tenant_has_a_limited_number_of_webhooks_and_each_wants_something(engi
         new_webhook(engine)
     with pytest.raises(Conflict, match="the limit of"):
         new_webhook(engine)
-    with transaction(engine) as conn, pytest.raises(InvalidInput, match="is empty"):
-        change_webhook(conn, DEFAULT_TENANT, list_webhooks(conn, DEFAULT_TENANT).rows[0].id, WebhookChange(events=[]))
+    with transaction(engine) as conn:
+        webhook = list_webhooks(conn, DEFAULT_TENANT).rows[0].id
+        with pytest.raises(InvalidInput, match="is empty"):
+            change_webhook(conn, DEFAULT_TENANT, webhook, WebhookChange(events=[]))
+        for change in (WebhookChange(name="a\0"), WebhookChange(url="https://a\0/")):
+            with pytest.raises(InvalidInput, match=r"^(name|url): .*NUL"):
+                change_webhook(conn, DEFAULT_TENANT, webhook, change)
     with pytest.raises(InvalidInput, match="NUL"), transaction(engine) as conn:
         create_webhook(conn, NewWebhook(DEFAULT_TENANT, "https://a\0/", [], b""))

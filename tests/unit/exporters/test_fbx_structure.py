@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import struct
 from pathlib import Path
 
 import pytest
 
 from marey.exporters import Coordinates, exporter_of
+from marey.motion.io.fbx_nodes import MAGIC
 from marey.motion.io.fbx_write import format_fbx
 from tests.support.archives import archive
 from tests.support.fbx_structure import Structure, joined, structure_of
@@ -73,3 +75,24 @@ def test_nodes_over_a_rig_are_written_as_maya_writes_them() -> None:
     ours = structure_of(exporter_of("fbx").write(CLIP, Coordinates(rig=str(archive("rigs/rig-human.glb")))))
     assert set(ours.nodes) - set(KNOWN.nodes) == set()
     assert set(ours.connections) - set(KNOWN.connections) == {"OP AnimationCurveNode/ Model/Null Lcl Rotation"}
+
+
+def node_ends(data: bytes, at: int, end: int) -> None:
+    """Walk the nodes of a list, which ends in 13 bytes of zero, up to where their parent says that it ends."""
+    while True:
+        stop, _, size, length = struct.unpack_from("<IIIB", data, at)
+        if stop == 0:
+            assert data[at : at + 13] == bytes(13)
+            assert at + 13 == end or end == 0
+            return
+        start = at + 13 + length + size
+        assert start <= stop
+        if start < stop:
+            node_ends(data, start, stop)
+        at = stop
+
+
+@pytest.mark.parametrize("name", WRITTEN)
+def test_every_list_of_nodes_has_its_end(name: str) -> None:
+    data = exporter_of("fbx").write(CLIP, Coordinates(**WRITTEN[name]))
+    node_ends(data, len(MAGIC) + 4, 0)

@@ -19,6 +19,7 @@ from tests.support.exported import tumbling
 from tests.support.glb import Glb
 from tests.support.walker import walker
 
+ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963  # of WebGL
 RATES = (20.0, 24.0, 25.0, 30.0, 60.0, 24000 / 1001)
 CLIPS = {
     **{f"a walk at {fps:.3f} fps": walker(fps=fps, turn=0.7) for fps in RATES},
@@ -121,6 +122,8 @@ def broken() -> dict[str, bytes]:
         "an npz": walker().to_npz(),
         "cut off": good[:-4],
         "cut in its JSON": good[:300],
+        "a first chunk of another kind": good.replace(b"JSON", b"JSOM", 1),
+        "a second chunk of another kind": good.replace(b"BIN\0", b"BIM\0", 1),
         "another version": good[:4] + b"\1" + good[5:],
         "another program": good.replace(b'"generator":"Marey"', b'"generator":"Other"'),
         "no animation": good.replace(b'"animations"', b'"Animations"'),
@@ -161,6 +164,11 @@ def test_a_body_is_bound_at_rest_and_stands_on_the_floor(skeleton: Skeleton, roo
     carriers = seen.accessor(primitive["attributes"]["JOINTS_0"])[:, 0]
     triangles = seen.accessor(primitive["indices"]).reshape(-1, 3)
     assert weights.tolist() == [[1, 0, 0, 0]] * len(points)
+    accessors, views = seen.document["accessors"], seen.document["bufferViews"]
+    uses = [views[accessors[number]["bufferView"]].pop("target") for number in primitive["attributes"].values()]
+    assert set(uses) == {ARRAY_BUFFER}
+    assert views[accessors[primitive["indices"]]["bufferView"]].pop("target") == ELEMENT_ARRAY_BUFFER
+    assert not any("target" in view for view in views), "what is of no mesh is for no buffer of it"
     span = float(np.ptp(clip.skeleton.rest[:, 1]))
     assert -0.03 * span < points[:, 1].min() < 0.02 * span, "its soles are on the floor"
     assert 1.05 * span < np.ptp(points[:, 1]) < 1.25 * span

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import secrets
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -9,7 +11,8 @@ import pytest
 from marey.bundles import find_bundle
 from marey.core.settings import Settings
 from marey.items.item import Item
-from marey.jobs.generators import GeneratorCapabilities, capabilities_of
+from marey.items.values import MAX_SEED
+from marey.jobs.generators import GeneratorCapabilities, capabilities_of, new_items
 from marey.text.keys import scope_key
 from marey.vocabulary.scope import ActionLists, match_scope
 from tests.support.live_api import write_bundle
@@ -39,3 +42,13 @@ def test_what_words_decide_has_no_key(generator: GeneratorCapabilities) -> None:
     prompt = "a person bows"
     assert generator.scope_key(Item(prompt), match_scope(prompt, LISTS)) is None
     assert generator.scope_key(Item(prompt), None) is None
+
+
+def test_drawn_seeds_of_all_variants_are_seeds(
+    generator: GeneratorCapabilities, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    item = Item("a person bows", variants=8)
+    for draw, first in ((lambda _: 0, 0), (lambda below: below - 1, MAX_SEED - 7)):
+        monkeypatch.setattr(secrets, "randbelow", draw)
+        assert [new.seed for new in new_items([(item, generator)])] == list(range(first, first + 8))
+    assert [new.seed for new in new_items([(replace(item, seed=5), generator)])] == list(range(5, 13))

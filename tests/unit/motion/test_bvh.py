@@ -139,6 +139,7 @@ def test_a_wrong_frame_count_is_noted_and_all_frames_are_read(said):
         ("0.05", 20),
         ("0.08", 12.5),
         ("0.033", 1 / 0.033),
+        ("0.033323", 1 / 0.033323),
     ],
 )
 def test_a_rounded_frame_time_is_taken_back_to_its_rate(time, fps):
@@ -429,3 +430,13 @@ def test_a_file_of_as_many_frames_as_may_be_is_read(monkeypatch: pytest.MonkeyPa
 
 def test_units_are_told_in_metres() -> None:
     assert METRES == {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
+
+
+def test_bones_at_the_ends_have_the_size_of_what_they_stand_for() -> None:
+    """Of a head, a hand and toes, which have no joint at their tip."""
+    lines = format_bvh(walker(seconds=0.1)).splitlines()
+    ends = {lines[at - 4].split()[-1]: lines[at + 2].split()[1:] for at, line in enumerate(lines) if "End Site" in line}
+    lengths = {name: np.linalg.norm(np.array(offset, float)) for name, offset in ends.items()}
+    assert set(lengths) == {"L_foot", "R_foot", "head", "L_wrist", "R_wrist"}
+    for name, length in lengths.items():
+        assert (2 < length < 9) if "foot" in name else (10 < length < 25)

@@ -285,7 +285,8 @@ def test_a_frame_that_cannot_be_is_refused_and_the_file_goes_on(turns, root, mis
     good, place = dancer(frames=2)
     with LiveBVH.open(tmp_path / "a.bvh", HUMANML3D, 20) as live:
         live.add(good[0], place[0])
-        with pytest.raises(error, match=message):
+        with pytest.raises(error, match=message) as refused:
             live.add(turns, root, missing=missing)
+        assert str(refused.value.where).startswith(str(tmp_path / "a.bvh"))
         live.add(good[1], place[1])
     assert len(rows_of((tmp_path / "a.bvh").read_bytes())) == 2

@@ -5,7 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from marey.motion.courses import Course, bent, carried_on, turned, with_steps
+from marey.motion.courses import (
+    STEP_EVERY_S,
+    STEP_FROM,
+    STEP_S,
+    Course,
+    bent,
+    carried_on,
+    stand_clock,
+    turned,
+    with_steps,
+)
 from marey.motion.kinematics import forward_kinematics
 from marey.motion.rotations import about, rotate
 from marey.motion.skeleton import HUMANML3D
@@ -65,3 +75,30 @@ def test_a_body_that_is_moved_lifts_its_feet_and_none_goes_under_the_floor() -> 
     assert toes.min() > -0.02
     assert not contacts.all()
     assert place[-1, 2] - place[0, 2] == pytest.approx(1.5, abs=0.05)
+
+
+def test_a_stand_is_carried_by_its_middle_and_a_swing_from_one_middle_to_the_next() -> None:
+    stands = np.zeros(60, bool)
+    stands[10:20] = stands[35:46] = True
+    clock, still = stand_clock(stands, 20.0)
+    np.testing.assert_array_equal(still, stands)
+    assert set(clock[10:20]) == {14.5}
+    assert set(clock[35:46]) == {40.0}
+    assert clock[[0, 59]].tolist() == [0.0, 59.0]
+    assert (np.diff(clock) >= 0).all()
+    assert (np.diff(clock[19:36]) > 0.01).all()
+    back, _ = stand_clock(stands[::-1], 20.0)
+    np.testing.assert_allclose(59 - back[::-1], clock, atol=1e-9)
+
+
+def test_a_foot_steps_again_only_after_it_was_carried_as_far_again() -> None:
+    for speed in (0.003, 0.004, 0.008):
+        pushed = path((0.0, 0.0, speed), (0.0, 0.0, speed), frames=400)
+        stands, _ = with_steps(np.ones((400, 2), bool), pushed, np.zeros((400, 2, 3)), 20.0)
+        for side in range(2):
+            begins = np.flatnonzero(np.diff(stands[:, side].astype(int)) < 0)
+            carried = speed * np.diff(begins)
+            assert len(carried) > 5
+            ahead = speed * (STEP_EVERY_S - STEP_S / 2) * 20.0  # from the middle of a step to where the next one ends
+            assert carried.min() > STEP_FROM - ahead
+            assert carried.max() < STEP_FROM + speed * 2 * STEP_EVERY_S * 20.0 + 0.01

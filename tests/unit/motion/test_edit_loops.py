@@ -153,6 +153,10 @@ def test_a_loop_follows_its_record_through_other_operations(walk):
     assert (fast.frames - 1) / 20 == pytest.approx(cycle["seconds"])
     np.testing.assert_allclose(fast.root[-1], loop.root[-1], atol=1e-4)  # the last frame is still the first, moved
     assert "loop" not in edit(loop, [{"op": "trim", "to": 0.5}])[0].manifest
+    for rate in (10, 30, 60):
+        (again,) = edit(loop, [{"op": "fps", "rate": rate}])
+        assert again.frames == round((loop.frames - 1) * rate / 20) + 1
+        np.testing.assert_allclose(again.root[-1], loop.root[-1], atol=1e-4)
     (open_,) = edit(walk, [{"op": "loop", "end": "open"}])
     with pytest.raises(InvalidInput, match="open loop"):
         edit(open_, [{"op": "fps", "rate": 30}])

@@ -474,3 +474,50 @@ def test_every_operation_can_be_computed():
     for operation in OPERATIONS.values():
         if not operation.pieces:
             assert callable(operation.function()), operation.name
+
+
+BOUNDS = [
+    ("extend", "seconds", 0.1, 60.0),
+    ("in-between", "seconds", 0.1, 8.0),
+    ("concat", "blend", 0.0, 2.0),
+    ("loop", "blend", 0.1, 0.3),
+    ("speed", "factor", 0.1, 10.0),
+    ("smooth", "hz", 0.5, 60.0),
+    ("fps", "rate", 1.0, 240.0),
+    *((name, "seed", 0, 2**31 - 1) for name in ("extend", "in-between", "repaint", "body-part")),
+    *((name, "candidates", 1, 8) for name in ("extend", "repaint", "body-part")),
+]
+"""As docs/reference/edits.md and the help of the command line have them."""
+DEFAULTS = {"seed": 0, "candidates": 1, "force": False, "rest": "follow", "end": "closed", "remove": "travel"}
+
+
+@pytest.mark.parametrize(("name", "parameter", "low", "high"), BOUNDS)
+def test_both_bounds_of_a_number_are_allowed_and_nothing_beyond(name: str, parameter: str, low: float, high: float):
+    (read,) = (each.read for each in OPERATIONS[name].parameters if each.name == parameter)
+    assert [read(low), read(high)] == [low, high]
+    whole = isinstance(low, int)
+    for beyond in (low - 1, high + 1) if whole else (np.nextafter(low, -1), np.nextafter(high, 999)):
+        with pytest.raises(
+            ValueError, match=rf"number from {low:g} to" if not whole else rf"number from {low} to {high}"
+        ):
+            read(float(beyond))
+
+
+def test_what_is_not_said_of_an_operation_is_as_documented():
+    found = {each.name: each.default for operation in OPERATIONS.values() for each in operation.parameters}
+    assert {name: found[name] for name in DEFAULTS} == DEFAULTS
+    (joined,), (between,) = (read_steps([{"op": name, "with": "a"}]) for name in ("concat", "in-between"))
+    assert (joined.values["blend"], between.values["seconds"]) == (0.25, 1.0)
+    (loop,) = read_steps([{"op": "loop"}])
+    assert loop.values["blend"] == 0.3
+    generated = {"extend", "in-between", "repaint", "body-part"}
+    assert {operation.name for operation in OPERATIONS.values() if operation.needs_model} == generated
+
+
+def test_an_operation_after_which_a_loop_is_one_and_a_timeline_has_its_rows():
+    """As the table of the manifest in docs/reference/edits.md tells them."""
+    cycle = {operation.name for operation in OPERATIONS.values() if operation.keeps_cycle}
+    rows = {operation.name for operation in OPERATIONS.values() if operation.keeps_rows}
+    assert cycle == {"mirror", "speed", "in-place", "fps"}
+    assert rows == {"trim", "loop", "mirror", "speed", "in-place", "reverse", "smooth", "fps", "feet"}
+    assert [operation.name for operation in OPERATIONS.values() if operation.pieces] == ["split"]

@@ -11,6 +11,7 @@ import pytest
 
 from marey.core.errors import InvalidFile, InvalidInput, TooLarge
 from marey.motion.io import fbx_parse
+from marey.motion.io.fbx_document import time_mode
 from marey.motion.io.fbx_nodes import MAGIC
 from marey.motion.io.fbx_read import parse_fbx
 from marey.motion.io.fbx_scene import read_scene
@@ -242,3 +243,15 @@ def test_a_packed_array_takes_no_more_room_than_it_claims() -> None:
 )  # fmt: skip
 def test_the_rate_is_that_of_the_time_mode(settings: dict[str, float], fps: float) -> None:
     assert read_scene(scene_file([("a", -1, {})], settings), "a.fbx").fps == pytest.approx(fps)
+
+
+MODES = {1: 120, 2: 100, 3: 60, 4: 50, 5: 48, 6: 30, 7: 30, 8: 30000 / 1001, 9: 30000 / 1001, 10: 25, 11: 24, 12: 1000,
+         13: 24000 / 1001, 15: 96, 16: 72, 17: 60000 / 1001, 18: 120000 / 1001}  # fmt: skip
+"""Rates of `FbxTime::EMode` in the documentation of Autodesk's SDK; 7 and 8 are those with dropped frames."""
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_numbers_of_rates_are_those_of_the_sdk(mode: int) -> None:
+    assert read_scene(scene_file([("a", -1, {})], {"TimeMode": mode}), "a.fbx").fps == pytest.approx(MODES[mode])
+    if mode not in (7, 8):
+        assert time_mode(MODES[mode]) == (mode, -1.0)

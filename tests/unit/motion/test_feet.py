@@ -2,6 +2,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
 
 from marey.core.errors import InvalidInput
 from marey.motion.feet import FLOOR_BAND, RULE, _fill, clean_feet, find_contacts, floor_height, rule_for, runs, skate
@@ -253,3 +255,22 @@ def test_a_body_on_knees_and_hands_is_not_let_down_by_its_raised_feet():
     clean, contacts = clean_feet(joints, HUMANML3D, 20)
     assert not contacts.any()
     np.testing.assert_allclose(clean[:, KNEES, 1], 0.05, atol=0.01)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.lists(st.sampled_from([1, 2, 3, 4, 9, 25]), min_size=5, max_size=9), st.integers(0, 999))
+@example([3, 2, 2, 9, 1, 25, 2, 4, 4], 0)
+def test_stretches_are_joined_backwards_as_they_are_forwards(lengths, seed):
+    known = np.repeat(np.arange(len(lengths)) % 2 == 0, lengths)
+    values = np.random.default_rng(seed).normal(size=(len(known), 2))
+    filled, back = _fill(values, known, 20.0), _fill(values[::-1], known[::-1], 20.0)[::-1]
+    np.testing.assert_allclose(back, filled, atol=1e-9)
+
+
+@pytest.mark.parametrize("sigma", [0.2, 0.4, 1.0])
+def test_the_narrowest_smooth_cover_reaches_the_frames_beside(sigma):
+    values = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    cover = smooth_above(values, sigma)
+    assert (cover >= values - 1e-12).all()
+    assert cover[4] == cover[6] > 0.5
+    np.testing.assert_array_equal(smooth_above(values, 0.1), values)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -63,3 +64,14 @@ def test_an_arm_inside_the_trunk_comes_out_smoothly_and_bones_stay():
 def test_arms_outside_of_the_body_are_left_alone_to_the_last_bit():
     joints = np.array(walker(seconds=2).joints, np.float64)
     np.testing.assert_array_equal(clear_arms(joints, HUMANML3D, 20.0), joints)
+
+
+@pytest.mark.parametrize("size", [0.55, 1.3])
+def test_hands_of_a_child_meet_as_those_of_an_adult(size):
+    joints = forward_kinematics(HUMANML3D, *dancer(3, 60))
+    wanted = wrist_distance(joints, HUMANML3D) - 0.03
+    child = HUMANML3D.with_offsets(size * HUMANML3D.offsets)
+    adults, childs = join_hands(joints, wanted, HUMANML3D), join_hands(size * joints, size * wanted, child)
+    moved = wrist_distance(adults, HUMANML3D) - wrist_distance(joints, HUMANML3D)
+    assert moved.min() < -0.02 < moved.max() == 0.0
+    np.testing.assert_allclose(wrist_distance(childs, child) / size, wrist_distance(adults, HUMANML3D), atol=1e-3)

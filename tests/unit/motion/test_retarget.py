@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,10 +14,10 @@ from marey.motion.retarget.apply import on_body
 from marey.motion.retarget.load import load_body
 from marey.motion.retarget.reference import REFERENCES, reference_rig
 from marey.motion.retarget.retarget import retarget
-from marey.motion.retarget.source import source_of
+from marey.motion.retarget.source import rig_of, source_of
 from marey.motion.rigs.body import RigBody
-from marey.motion.rotations import Array, angle_between, from_rotvec, normalize
-from marey.motion.skeleton import HUMANML3D
+from marey.motion.rotations import Array, angle_between, conjugate, from_rotvec, normalize, rotate
+from marey.motion.skeleton import HUMANML3D, SKELETONS
 from tests.support.changed_rigs import Change, lively, source_on_rig
 from tests.support.walker import walker
 
@@ -144,9 +146,28 @@ def test_a_root_bone_takes_the_travel_and_no_joint_moves():
     assert np.abs(plain.world()[1][:, kept] - rooted.world()[1][:, kept]).max() < 1e-5
     travel = rooted.world()[1][:, [root, hips]]
     assert np.abs(travel[:, 0, 1]).max() < 1e-9
-    assert np.abs(np.diff(travel[:, 0, [0, 2]] - travel[:, 1, [0, 2]], axis=0)).max() < 1e-6
+    apart = body.rig.positions[root] - body.rig.positions[hips]
+    np.testing.assert_allclose((travel[:, 0] - travel[:, 1])[:, [0, 2]], [apart[[0, 2]]] * rooted.frames, atol=1e-6)
+    assert np.ptp(travel[:, 0, 2]) > 1
+    world, places = rooted.world()
+    for name in ("ik_foot_root", "ik_hand_root"):
+        joint = body.rig.index(name)
+        on_root = rotate(conjugate(world[:, root]), places[:, joint] - places[:, root])
+        np.testing.assert_allclose(on_root, [body.rig.offsets[joint]] * rooted.frames, atol=1e-6)
     with pytest.raises(InvalidInput, match="no bone above the hips"):
         on_body(LIVELY, load_body("mixamo"), ExportOptions(rig="mixamo", root_bone=True))
+
+
+def test_a_root_bone_keeps_its_place_beside_hips_that_do_not_stand_over_it():
+    rig = reference_rig("ue4")
+    root = rig.index("root")
+    places = np.add(rig.positions, [0.03, 0.0, 0.1])
+    places[root] = rig.positions[root]
+    body = RigBody.of(replace(rig, positions=places))
+    motion = on_body(LIVELY, body, ExportOptions(rig="ue4", root_bone=True))
+    hips = body.map.parts["hips"]
+    apart = (motion.world()[1][:, root] - motion.world()[1][:, hips])[:, [0, 2]]
+    np.testing.assert_allclose(apart, [(places[root] - places[hips])[[0, 2]]] * motion.frames, atol=1e-6)
 
 
 def test_in_place_and_a_rest_frame():
@@ -177,3 +198,11 @@ def test_reference_skeletons_are_pinned():
     assert {name: len(reference_rig(name)) for name in REFERENCES} == {"mixamo": 65, "ue4": 68, "humanik": 72}
     for name in REFERENCES:
         assert np.abs(np.linalg.norm(reference_rig(name).orientations, axis=-1) - 1).max() < 1e-9
+
+
+def test_the_rig_of_a_skeleton_stands_on_the_floor():
+    for skeleton in SKELETONS.values():
+        offsets = skeleton.offsets.copy()
+        offsets[0, 1] += 0.3
+        rig = rig_of(skeleton.with_offsets(offsets))
+        assert rig.positions[:, 1].min() == pytest.approx(0.0, abs=1e-6)

@@ -28,6 +28,7 @@ from marey.motion.retarget.reference import REFERENCES, reference_rig
 from marey.motion.rigs.body import RigBody
 from marey.motion.rigs.joint_map import map_joints
 from marey.motion.rigs.rename import renamed
+from marey.motion.rigs.report import describe
 from marey.motion.rigs.rig import MAX_JOINTS
 from marey.motion.rigs.words import read_names
 from marey.motion.rotations import about, angle_between, multiply, rotate
@@ -44,6 +45,7 @@ def test_a_rig_read_from_its_own_glb_is_the_rig(name):
     motion = on_body(WALK, RigBody.of(rig))
     read = parse_glb_rig(format_rigged_glb(motion), "x.glb")
     assert read.joint_names == rig.joint_names
+    assert b'"scale"' not in format_rigged_glb(motion), "nodes of their full size state none"
     assert np.abs(read.positions - rig.positions).max() < 1e-6
     assert angle_between(read.orientations, rig.orientations).max() < 1e-5
 
@@ -350,3 +352,66 @@ def test_options_that_contradict_a_rig(options):
         ExportOptions(rig="mixamo", **options)
     with pytest.raises(InvalidInput, match="belongs to a rig"):
         ExportOptions(rig_map="x.json")
+
+
+@pytest.mark.parametrize("word", ["l", "left", "lft"])
+def test_names_tell_the_side_and_the_part(word):
+    other = {"l": "r", "left": "right", "lft": "rgt"}[word]
+    spellings = ("{}_hand_2", "hand.{}.002", "Bip01_{}_Hand2", "DEF-hand.2.{}")
+    for spelling in spellings:
+        sides = (word.capitalize(), other.capitalize()) if "Bip" in spelling else (word, other)
+        names = [spelling.format(each) for each in sides]
+        found = read_names(
+            [*names, *(name.replace("and", "eel") for name in names), "Spine1", "Spine2", "Neck", "Head"]
+        )
+        assert [(each.side, each.word, each.number) for each in found[:2]] == [(0, "hand", 2), (1, "hand", 2)]
+    assert [each.side for each in read_names(["Spine2", "neck"])] == [None, None]
+
+
+def _with_joint(rig, name, parent, child):
+    """The rig with one more joint between two, halfway."""
+    names, at = list(rig.joint_names), rig.index(child)
+    parents = [each + (each >= at) for each in rig.parents]
+    parents[at] = at
+    names.insert(at, name)
+    parents.insert(at, rig.index(parent))
+    middle = (rig.positions[at] + rig.positions[rig.index(parent)]) / 2
+    fields = {"scales": rig.scales, "tips": rig.tips, "orientations": rig.orientations}
+    return replace(
+        rig,
+        joint_names=tuple(names),
+        parents=tuple(parents),
+        positions=np.insert(rig.positions, at, middle, axis=0),
+        bones=(True,) * len(names),
+        **{key: np.insert(each, at, each[at], axis=0) for key, each in fields.items()},
+    )
+
+
+def test_a_wrist_between_the_lower_arm_and_the_hand_is_the_hand_of_the_body():
+    bare = replace(reference_rig("mixamo"), notes=())
+    for name, hand in (("mixamorig:LeftWrist", "mixamorig:LeftWrist"), ("mixamorig:LeftCuff", "mixamorig:LeftHand")):
+        rig = _with_joint(bare, name, "mixamorig:LeftForeArm", "mixamorig:LeftHand")
+        found = map_joints(rig)
+        assert rig.joint_names[found.parts["left_hand"]] == hand
+
+
+def test_a_report_says_what_became_of_every_joint():
+    for name, root, roles in (
+        ("mixamo", None, {"mixamorig:HeadTop_End": "control or end"}),
+        (
+            "ue4",
+            "root",
+            {"root": "root", "upperarm_twist_01_l": "twist of left_upper_arm", "ik_foot_l": "follows left_foot"},
+        ),
+    ):
+        body = load_body(name)
+        report = describe(body)
+        assert json.loads(json.dumps(report)) == report
+        assert (report["name"], report["root"], report["unit"], report["up"]) == (name, root, 0.01, body.rig.up)
+        assert report["pose"] == "standing"
+        assert report["leg"] == pytest.approx(body.leg, abs=1e-4)
+        told = [*(part["joint"] for part in report["parts"].values()), *report["others"]]
+        assert sorted(told) == sorted(body.rig.joint_names)
+        assert report["parts"]["left_foot"]["joint"] == body.rig.joint_names[body.map.parts["left_foot"]]
+        for joint, role in roles.items():
+            assert report["others"][joint].startswith(role)

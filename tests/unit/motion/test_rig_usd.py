@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import signal
 import subprocess
 import sys
 import types
 
+import numpy as np
 import pytest
 
 from marey.core.errors import InvalidFile, TooLarge
 from marey.core.extras import MissingExtra
 from marey.motion.io import rig_usd
+from marey.motion.io.usd_child import UnreadableUsd, _parents  # pyright: ignore[reportPrivateUsage]
+from marey.motion.retarget.reference import reference_rig
 from marey.motion.rigs.read import parse_rig
+from marey.motion.rotations import angle_between, to_matrix
 from tests.support.usd import usda
 
 DATA = usda().encode()
@@ -66,3 +72,47 @@ def test_a_child_gets_no_settings(monkeypatch):
         parse_rig(DATA, "hero.usd")
     assert seen
     assert not [name for name in seen if name.startswith(("MAREY_", "PXR_"))]
+
+
+def answer_of(monkeypatch, **changes) -> None:
+    """Let the child find a reference skeleton."""
+    rig = reference_rig("mixamo")
+    matrices = np.tile(np.eye(4), (len(rig), 1, 1))
+    matrices[:, :3, :3], matrices[:, :3, 3] = to_matrix(rig.orientations), rig.positions / 0.01
+    found = {
+        "names": rig.joint_names,
+        "parents": rig.parents,
+        "matrices": [matrix.T.reshape(-1).tolist() for matrix in matrices],  # rows are the axes
+        "unit": 0.01,
+        "up": "y",
+        "notes": ["two skeletons"],
+    }
+    output = json.dumps(found | changes).encode()
+    monkeypatch.setitem(sys.modules, "pxr", types.ModuleType("pxr"))
+    monkeypatch.setattr(rig_usd.subprocess, "run", lambda *_, **__: subprocess.CompletedProcess([], 0, output, b""))
+
+
+def test_a_skeleton_that_the_child_finds_is_a_rig(monkeypatch):
+    answer_of(monkeypatch)
+    rig, wanted = parse_rig(DATA, "folder/hero.usd"), reference_rig("mixamo")
+    assert (rig.name, rig.unit, rig.up, rig.source, rig.sha256) == (
+        "hero.usd", 0.01, "y", "usd", hashlib.sha256(DATA).hexdigest(),
+    )  # fmt: skip
+    assert "two skeletons" in rig.notes
+    assert rig.joint_names == wanted.joint_names
+    np.testing.assert_allclose(rig.positions, wanted.positions, atol=1e-6)
+    assert angle_between(rig.orientations, wanted.orientations).max() < 1e-5
+
+
+@pytest.mark.parametrize("changes", [{"unit": 1e-7}, {"unit": 1e7}, {"up": "x"}, {"unit": 0}])
+def test_a_stage_of_a_unit_or_axis_that_no_rig_has_is_refused(changes, monkeypatch):
+    answer_of(monkeypatch, **changes)
+    with pytest.raises(InvalidFile, match=r"^hero\.usd: its unit of"):
+        parse_rig(DATA, "hero.usd")
+
+
+def test_joints_hang_on_the_nearest_joint_above():
+    assert _parents(["Hips", "Hips/Spine", "Hips/Over/Leg", "Hips/Over/Leg/Foot", "Prop"]) == [-1, 0, 0, 2, -1]
+    for paths, message in ((["Hips", "Hips"], "one path"), (["Hips/Leg", "Hips"], "stands before its parent")):
+        with pytest.raises(UnreadableUsd, match=message):
+            _parents(paths)

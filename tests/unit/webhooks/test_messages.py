@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import stat
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -21,6 +22,7 @@ from marey.webhooks.deliveries import DELAYS, HOLD, delay_after
 from marey.webhooks.message import headers_of, message_of
 from marey.webhooks.vault import Vault, key_file, new_signing_secret
 
+GUIDE = Path(__file__).resolve().parents[3] / "docs" / "how-to" / "webhooks.md"
 JOB = UUID(int=7)
 AT = datetime(2026, 11, 22, 3, 0, tzinfo=UTC)
 API = "https://marey.example"
@@ -95,6 +97,9 @@ def test_the_address_of_the_api_is_the_public_one_if_it_is_named() -> None:
 def test_eight_tries_span_a_day_and_no_try_can_outlast_its_claim() -> None:
     assert len(DELAYS) + 1 == 8
     assert 23 * 3600 < sum(DELAYS) < 24 * 3600
+    (told,) = (line for line in GUIDE.read_text(encoding="utf-8").splitlines() if "after the one before" in line)
+    units = {"s": 1, "min": 60, "h": 3600}
+    assert [float(n) * units[unit] for n, unit in re.findall(r"([\d.]+) (s|min|h)\b", told)] == list(DELAYS)
     for number, delay in enumerate(DELAYS, 1):
         drawn = [delay_after(number) for _ in range(200)]
         assert 0.9 * delay <= min(drawn) < 0.93 * delay
@@ -117,7 +122,7 @@ def test_no_key_or_a_broken_one_names_the_setting() -> None:
         Vault.of(Settings(webhook_key=None))
     assert refused.value.where == "MAREY_WEBHOOK_KEY"
     for broken in ("", "abc", Fernet.generate_key().decode()[:-4]):
-        with pytest.raises(InvalidInput, match="not a list of keys"):
+        with pytest.raises(InvalidInput, match=r"^MAREY_WEBHOOK_KEY: is not a list of keys"):
             Vault.of(Settings(webhook_key=SecretStr(broken)))
 
 
