@@ -1,6 +1,7 @@
 """Mutations of a Python source file: one small edit each, of six kinds, found by walking its syntax tree.
 
-No mutation touches strings, annotations, docstrings, decorators, log calls, `__all__` or `if TYPE_CHECKING`.
+No mutation touches strings, annotations, docstrings, decorators, log calls, `__all__`, `if TYPE_CHECKING`, or what a
+field says of its representation (`repr=`).
 """
 
 from __future__ import annotations
@@ -131,7 +132,9 @@ class _Finder:
     def _arguments(self, node: ast.Call) -> Iterator[Mutation]:
         """Leave out any named argument, and the last of several positional ones, but no text."""
         given = sorted([*node.args, *node.keywords], key=self._span)
-        droppable: list[ast.AST] = [each for each in node.keywords if each.arg and not _is_text(each.value)]
+        droppable: list[ast.AST] = [
+            each for each in node.keywords if each.arg not in (None, "repr") and not _is_text(each.value)
+        ]
         if len(node.args) > 1 and not isinstance(node.args[-1], ast.Starred) and not _is_text(node.args[-1]):
             droppable.append(node.args[-1])
         bounds = [self.source.find(b"(", self._span(node.func)[1])]
@@ -198,7 +201,7 @@ def _children(node: ast.AST) -> Iterator[ast.AST]:
 
 def _is_left_alone(node: ast.AST) -> bool:
     match node:
-        case ast.JoinedStr():
+        case ast.JoinedStr() | ast.keyword(arg="repr"):
             return True
         case ast.If(test=ast.Name(id="TYPE_CHECKING")):
             return True

@@ -67,6 +67,7 @@ def test_removed_statements_are_those_that_leave_no_name_missing() -> None:
         '__all__ = ["a" + b]',
         'f(a, "text")',
         'f(a, hint=f"{b}")',
+        "x = field(repr=False)",
     ],
 )
 def test_text_types_decorators_and_logs_are_left_alone(source: str) -> None:

@@ -230,8 +230,9 @@ def test_a_new_file_of_tests_is_recorded_on_its_own(root: Path, known: LineMap) 
         updated = current_map(root, root / "out", 0)
     finally:
         new.unlink()
-    assert updated.covering(PRODUCT, [22]) == {"tests/unit/test_new.py::test_unused"}
-    assert updated.covering(PRODUCT, [11]) == names("test_capped")
+    lines = {text.strip(): number for number, text in enumerate(SOURCE.splitlines(), 1)}
+    assert updated.covering(PRODUCT, [lines["return x + 1"]]) == {"tests/unit/test_new.py::test_unused"}
+    assert updated.covering(PRODUCT, [lines["return min(x, LIMIT)"]]) == names("test_capped")
     assert len(updated.tests) == len(known.tests) + 1
 
 

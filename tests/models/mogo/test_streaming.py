@@ -400,3 +400,24 @@ def test_a_level_depends_on_the_code_of_the_level_below() -> None:
         frame.next(None)
         found.append(frame.next(code[None]))
     assert not torch.allclose(*found)
+
+
+def test_who_takes_the_row_of_a_clip_that_has_ended_begins_anew() -> None:
+    model = transformer()
+    model.head.bias.data[-1] = 100.0  # END is all but certain
+    streams = opened(model, 1)
+    clip = streams.start(said(1), 1, ends_from=0)
+    assert (run(streams, 2)[clip] == -1).all()
+    streams.stop(clip)
+    session = streams.start(said(2), 2)
+    assert torch.equal(run(streams, 5)[session], alone(2, 5, model))
+
+
+def test_a_clip_that_has_ended_goes_on_when_it_is_steered() -> None:
+    model = transformer()
+    model.head.bias.data[-1] = 100.0
+    streams = opened(model, 1)
+    clip = streams.start(said(1), 1, ends_from=0)
+    assert (run(streams, 2)[clip] == -1).all()
+    streams.steer(clip, said(2))
+    assert (run(streams, 5)[clip] >= 0).all()

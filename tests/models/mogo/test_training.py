@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from marey.data.style import style_of
 from marey.models.mogo import steers
 from marey.models.mogo.assembly import assemble, unpack
 from marey.models.mogo.config import TINY, MOGOConfig
+from marey.models.mogo.level_token import build_transformer
 from marey.models.mogo.memory import memory_model
 from marey.models.mogo.model import NOT_ASKED, RQHCTransformer, next_targets
 from marey.models.mogo.rollouts import Rollouts
@@ -256,3 +258,35 @@ def test_a_bundle_records_captions_of_its_training_data(tmp_path: Path) -> None:
     assert made.manifest.text is not None
     assert made.manifest.text.style == style_of(data.split("train"))
     assert set(made.manifest.text.style) == {f"a person does {act}" for act in ("walk", "bow", "jump")}
+
+
+def test_prompts_are_standardised_over_the_training_captions_unless_the_bundle_says_otherwise(
+    stage: TransformerStage,
+) -> None:
+    captions = stage.samples.captions
+    spoken = captions.sentence[captions.captions_of(stage.pairs.train.tolist())]
+    read = stage.module.prompt.standardised(captions.strings[spoken].double())
+    torch.testing.assert_close(read.mean(0), torch.zeros(384).to(read), atol=1e-4, rtol=0)
+    torch.testing.assert_close(read.std(0, correction=0), torch.ones(384).to(read), atol=1e-3, rtol=0)
+    plain = replace(TINY, condition=replace(TINY.condition, standardised=False))
+    places = (torch.from_numpy(each)[:, None] for each in (stage.samples._starts, stage.samples.lengths))
+    tokens = TokenData(stage.samples.tokens, *places)
+    prompt = TransformerStage(plain, stage.samples.clips, tokens, captions).module.prompt
+    assert not prompt.mean.any()
+    assert (prompt.std == 1).all()
+
+
+def test_validation_of_a_network_that_knows_nothing_is_that_of_chance(stage: TransformerStage) -> None:
+    """Of K codes each is right once in K times, on every level; level 0 may be END as well."""
+    known = stage.module
+    stage.module = build_transformer(TINY).eval()
+    for parameter in stage.module.head.parameters():
+        parameter.data.zero_()
+    found = stage.validate()
+    stage.module = known
+    codes = TINY.tokenizer.codes
+    assert found["loss/0"] == pytest.approx(math.log(codes + 1), rel=1e-4)
+    for level in range(1, TINY.tokenizer.levels):
+        assert found[f"loss/{level}"] == pytest.approx(math.log(codes), rel=1e-4)
+        assert found[f"accuracy/{level}"] == pytest.approx(1 / codes, rel=1e-3)
+    assert found["accuracy/0"] == pytest.approx(1 / (codes + 1), rel=1e-3)

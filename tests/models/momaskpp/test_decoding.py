@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
+from typing import Any
 
 import pytest
 import torch
@@ -136,3 +138,32 @@ def test_items_that_are_dropped_leave_the_others_as_they_are(tiny: tuple[ScaleTr
     answers = iter([None, torch.tensor([True, False, True]), *[None] * 10])
     some = decode(model, items, scales, config.inference, lambda: next(answers)).tokens
     assert torch.equal(some, whole[[0, 2]])
+
+
+@pytest.mark.parametrize("steps", [2, 3, 18])
+@pytest.mark.parametrize("total", [2, 48, 91])
+def test_the_first_pass_has_all_tokens_to_decide_and_the_last_one(total: int, steps: int) -> None:
+    counts = remaining_counts(total, steps)
+    assert (counts[0], counts[-2:]) == (total, [1, 0])
+
+
+def test_a_pass_that_keeps_no_token_is_left_out(
+    tiny: tuple[ScaleTransformer, MoMaskPPConfig], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model, config = tiny
+    scales, rows = Scales.of(config), list[int]()
+    plain = ScaleTransformer.forward
+
+    def forward(self: ScaleTransformer, tokens: Tensor, *rest: Any) -> Tensor:
+        rows.append(len(tokens) // 2)  # with and without the words
+        return plain(self, tokens, *rest)
+
+    monkeypatch.setattr(ScaleTransformer, "forward", forward)
+    states, present = torch.randn(2, 12, 384), torch.ones(2, 12, dtype=torch.bool)
+    items = make_items(model, scales, torch.tensor([4, 45]), states, present)
+    made = decode(model, items, scales, replace(config.inference, steps=20), lambda: None).tokens
+    assert torch.equal(made >= 0, scales.valid(items.lengths))
+    passes = [remaining_counts(scales.total(n), 20) for n in (4, 45)]
+    wanted = [sum(a > b for a, b in pairwise(counts)) for counts in passes]
+    assert sum(rows) == sum(wanted) < 2 * 20
+    assert len(rows) == max(wanted)

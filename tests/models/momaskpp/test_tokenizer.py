@@ -133,3 +133,17 @@ def test_codes_are_drawn_by_distance_in_training_where_a_temperature_is_set() ->
 
 def test_a_tokenizer_is_built_from_a_manifests_parameters() -> None:
     assert build_tokenizer(TINY.to_dict()).scales == Scales.of(TINY)
+
+
+def test_without_lengths_all_clips_have_the_longest() -> None:
+    for layout in ("own", "padded"):
+        config = replace(TINY, tokenizer=replace(TINY.tokenizer, layout=layout))
+        tokenizer = Tokenizer(config).eval()
+        tokenizer.quantizer.codebooks.normal_()
+        features = torch.randn(2, config.max_frames, 263)
+        longest = torch.full((2,), config.max_frames)
+        tokens = tokenizer.encode(features)
+        assert torch.equal(tokens, tokenizer.encode(features, longest))
+        found = tokenizer.decode(tokens)
+        assert found.shape == features.shape
+        assert torch.equal(found, tokenizer.decode(tokens, longest // tokenizer.frames_per_token))

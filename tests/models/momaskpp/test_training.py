@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -356,3 +357,50 @@ def test_a_padded_batch_has_the_loss_of_its_pieces(prepared: PreparedData, words
     assert batch.tokens.shape[1] == stage.scales.size
     torch.testing.assert_close(padded, loss)
     assert float(shown["accuracy"]) == pytest.approx(float(logs["accuracy"]))
+
+
+def test_the_root_counts_once_more_by_its_weight(prepared: PreparedData) -> None:
+    data = MotionData.load(prepared.path, CPU)
+    model = ScaleTokenizerStage(TINY, data, Tokenizer(TINY)).module.eval()
+    model.quantizer.codebooks.normal_()
+    features, lengths = data.windows(torch.tensor([0, 50]), 32), torch.tensor([32, 20])
+
+    def total(weight: float) -> float:
+        config = replace(TINY, tokenizer=replace(TINY.tokenizer, root_weight=weight))
+        return tokenizer_loss(model, config, features, lengths, 1.0).total.item()
+
+    output = model(features, lengths)[0]
+    error = torch.nn.functional.smooth_l1_loss(output, model.normalize(features), reduction="none")[..., :4]
+    own = torch.cat([error[0], error[1, :20]]).mean()
+    assert total(3.0) - total(0.0) == pytest.approx(3 * float(own), rel=1e-3)
+
+
+def test_errors_of_features_without_positions_are_those_of_whole_tokens_of_each_captured_clip(
+    prepared: PreparedData,
+) -> None:
+    config = replace(TINY, layout=RELEASED_SNAPMOGEN.layout)
+    assert not has_positions(config)
+    data = MotionData.load(prepared.path, CPU)
+    stage = ScaleTokenizerStage(config, data, Tokenizer(TINY))
+    model = stage.module.eval()
+    model.quantizer.codebooks.normal_()
+    clips, expected = data.originals("val"), list[float]()
+    assert any(clip.length % model.frames_per_token for clip in clips)
+    for clip in clips:
+        frames = clip.length - clip.length % model.frames_per_token
+        features = data.features[clip.start : clip.start + frames][None]
+        made = model.decode(model.encode(features), torch.tensor([frames // model.frames_per_token]))
+        expected.append(float(((made - features) / model.std).abs().mean()))
+    assert stage.validate() == {"error": pytest.approx(float(np.mean(expected)), rel=1e-5)}
+    assert stage.test().keys() == {"test/error"}
+
+
+def test_a_network_that_knows_nothing_is_right_by_chance(prepared: PreparedData, words: WordData) -> None:
+    """Ties go to the first code, so how often it is right is the share of that code."""
+    stage = masked_stage(prepared, words)
+    stage.module.eval()
+    for parameter in stage.module.codes.parameters():
+        parameter.data.zero_()
+    found = stage.validate()
+    assert found["loss"] == pytest.approx(math.log(TINY.tokenizer.codes), rel=1e-4)
+    assert 0 <= found["accuracy"] < 0.5

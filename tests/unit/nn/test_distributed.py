@@ -1,4 +1,4 @@
-"""Gradients of several processes, of which one is played."""
+"""Gradients and codes of several processes, of which one is played."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import torch
 import torch.distributed as dist
 
 from marey.nn import distributed
+from marey.nn.quantizer import ResidualQuantizer
 
 
 def test_gradients_are_averaged_parameter_by_parameter(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -20,3 +21,57 @@ def test_gradients_are_averaged_parameter_by_parameter(monkeypatch: pytest.Monke
     assert torch.equal(second.grad, torch.tensor([5.0, 6.0, 7.0]))
     assert still.grad is not None
     assert not still.grad.any()
+
+
+class Other:
+    """Process 0 of two, played: this one is process 1."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, theirs: torch.Tensor | None) -> None:
+        """`theirs`: what the other process has to share."""
+        self.theirs = theirs
+        self.sent: list[torch.Tensor] = []
+        monkeypatch.setattr(distributed.dist, "is_initialized", lambda: True)
+        monkeypatch.setattr(dist, "get_world_size", lambda: 2)
+        monkeypatch.setattr(dist, "get_rank", lambda: 1)
+        monkeypatch.setattr(dist, "all_reduce", self.all_reduce)
+        monkeypatch.setattr(dist, "broadcast", self.broadcast)
+
+    def all_reduce(self, tensor: torch.Tensor) -> None:
+        """Say who has something; of sums the other process has nothing."""
+        if tensor.shape == (2,):
+            tensor[0] += float(self.theirs is not None)
+
+    def broadcast(self, tensor: torch.Tensor, src: int) -> None:
+        """Hand over what one of the two has."""
+        if src == 0:
+            assert self.theirs is not None
+            tensor.copy_(self.theirs)
+        else:
+            self.sent.append(tensor.clone())
+
+
+def test_the_first_process_that_has_something_gives_it_to_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    mine, theirs = torch.ones(3), torch.full((3,), 7.0)
+    like = torch.zeros(3)
+    assert distributed.broadcast_any(mine, like) is mine, "alone"
+    assert distributed.rank() == 0
+    other = Other(monkeypatch, theirs)
+    assert distributed.rank() == 1
+    for given in (None, mine.clone()):
+        assert torch.equal(distributed.broadcast_any(given, like), theirs)
+    assert torch.equal(distributed.broadcast(like.clone()), theirs)
+    other.theirs = None
+    assert torch.equal(distributed.broadcast_any(mine, like), mine)
+    assert [each.tolist() for each in other.sent] == [mine.tolist()]
+    assert distributed.broadcast_any(None, like) is None
+    assert not like.any()
+
+
+def test_codes_of_a_process_without_vectors_are_those_of_the_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    theirs = torch.randn(4, 3)
+    nothing = torch.zeros(2, 5, dtype=torch.bool)
+    for shared in (theirs, None):
+        quantizer = ResidualQuantizer(1, 4, 3, dropout=0.0).train()
+        Other(monkeypatch, shared)
+        quantizer(torch.randn(2, 5, 3), nothing)
+        assert torch.equal(quantizer.codebooks[0], torch.zeros(4, 3) if shared is None else theirs)
