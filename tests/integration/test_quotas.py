@@ -8,6 +8,7 @@ from uuid import UUID
 
 import pytest
 import sqlalchemy as sa
+from sqlalchemy.exc import OperationalError
 
 from marey.core.errors import Busy, Conflict, InvalidInput, NotFound, QuotaUsedUp
 from marey.db import transaction
@@ -378,5 +379,5 @@ def test_nothing_waits_for_a_tenant_without_quotas(
         for tenant in (free, bound):
             reserve(first, tenant, 1)
         reserve(second, free, 1)
-        with pytest.raises(sa.exc.OperationalError, match="lock timeout"):
+        with pytest.raises(OperationalError, match="lock timeout"):
             reserve(second, bound, 1)

@@ -104,7 +104,8 @@ class Selector:
         return uses
 
     def _affordable(self, names: set[str], path: str) -> list[str]:
-        """Tests within the budget: half of it for files that share a word with the mutant's, the rest in turn."""
+        """Tests within the budget: a quarter of it for the files whose names share the most words with the mutant's, as
+        much for all that share one, the rest in turn."""
         by_file: dict[str, list[str]] = defaultdict(list)
         for name in self._one_case_of_each_first(names):
             by_file[self.map.tests[name].file].append(name)
@@ -112,6 +113,8 @@ class Selector:
         near = sorted(by_file, key=lambda file: (file != holding, -_nearness(file, path), file))
         close = [by_file[file] for file in near if _nearness(file, path)]
         chosen = self._take(by_file.get(holding, ()), [], BUDGET_S / 2)
+        nearest = [by_file[file] for file in near if _nearness(file, path) == _nearness(near[0], path)]
+        chosen = self._take(_in_turn(nearest), chosen, BUDGET_S / 4)
         chosen = self._take(_in_turn(close), chosen, BUDGET_S / 2)
         chosen = self._take(_in_turn(by_file[file] for file in near), chosen, BUDGET_S)
         return sorted(chosen, key=lambda name: (near.index(self.map.tests[name].file), self.map.tests[name].seconds))

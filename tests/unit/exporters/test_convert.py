@@ -76,5 +76,5 @@ def test_a_format_that_is_only_written_is_not_read(tmp_path):
 def test_a_target_without_a_folder_is_refused_before_anything_is_made(folder, message, tmp_path, monkeypatch):
     walker(seconds=0.2).save_npz(tmp_path / "a.npz")
     monkeypatch.setattr("marey.exporters.convert._decode", None)  # it is not read
-    with pytest.raises(InvalidInput, match=message):
+    with pytest.raises(InvalidInput, match=f"{folder}.*: .*{message}"):
         convert(tmp_path / "a.npz", tmp_path / folder / "b.gif")

@@ -161,7 +161,7 @@ def test_a_clip_with_numbers_that_are_not_finite_is_refused() -> None:
     clip = walker()
     root = clip.root.copy()
     root[3, 1] = np.nan
-    with pytest.raises(InvalidInput, match="NaN or infinite"):
+    with pytest.raises(InvalidInput, match=r"^pelvis: .*NaN or infinite"):
         format_fbx(replace(clip, root=root))
 
 

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import json
+import struct
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -97,7 +101,7 @@ def test_a_clip_with_numbers_that_are_not_finite_is_refused() -> None:
     clip = walker()
     root = clip.root.copy()
     root[3, 1] = np.nan
-    with pytest.raises(InvalidInput, match="NaN or infinite"):
+    with pytest.raises(InvalidInput, match=r"^humanml3d: .*NaN or infinite"):
         format_glb(replace(clip, root=root))
 
 
@@ -137,6 +141,52 @@ def broken() -> dict[str, bytes]:
         "NaN": good[:-4] + np.float32(np.nan).tobytes(),
         "a place beyond float32": good.replace(b'"translation":[0.0,', b'"translation":[9e9,', 1),
     }
+
+
+def rewritten(change: Callable[[dict[str, Any], bytearray], Any]) -> bytes:
+    """A file whose JSON and numbers were changed."""
+    good = format_glb(walker(seconds=0.2))
+    end = 20 + int.from_bytes(good[12:16], "little")
+    document, numbers = json.loads(good[20:end]), bytearray(good[end + 8 :])
+    text = json.dumps(change(document, numbers) or document).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(numbers), b"BIN\0") + numbers
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+
+def double_turns(document: dict[str, Any], numbers: bytearray) -> None:
+    """Let the first rotation have the length 2."""
+    track = document["animations"][0]["samplers"][0]["output"]
+    at = document["bufferViews"][document["accessors"][track]["bufferView"]]["byteOffset"]
+    numbers[at : at + 16] = np.array([0, 0, 0, 2], "<f4").tobytes()
+
+
+def widen(document: dict[str, Any], numbers: bytearray) -> None:
+    """Let bones be as long as float32 can say."""
+    for node in document["nodes"][1:]:
+        node["translation"] = [3e38, 0.0, 0.0]
+
+
+def send_away(document: dict[str, Any], numbers: bytearray) -> None:
+    """Let the motion have been taken from farther away than float32 can say."""
+    extras = document["asset"]["extras"]
+    extras["options"]["placement"] = "keep"
+    extras["manifest"]["placement"] = {"x": 1e300, "z": 0.0, "heading": 0.0}
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda *_: ["no object"], "its JSON is not an object"),
+        (double_turns, "has no frames, or rotations that are none"),
+        (widen, "holds NaN, or numbers over 1,000,000"),
+        (send_away, "holds numbers that are too large"),
+    ],
+)
+def test_numbers_that_no_motion_has_are_refused(change: Any, message: str) -> None:
+    assert parse_glb(rewritten(lambda *_: None)).frames == 5
+    with pytest.raises(InvalidFile, match=rf"^a\.glb: .*({message})"):
+        parse_glb(rewritten(change), "a.glb")
 
 
 @pytest.mark.parametrize("name", broken())

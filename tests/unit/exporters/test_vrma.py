@@ -9,6 +9,7 @@ import pytest
 
 from marey.core.errors import InvalidInput
 from marey.exporters import Coordinates, exporter_of
+from marey.motion.clip import MotionClip
 from marey.motion.export_options import ExportOptions
 from marey.motion.io.vrma_write import REQUIRED, format_vrma
 from marey.motion.skeleton import KIT, SNAPMOGEN, Skeleton
@@ -52,9 +53,28 @@ def test_no_prompt_is_in_it_and_equal_clips_give_equal_bytes() -> None:
     assert data != format_vrma(clip, ExportOptions(in_place="travel"))
 
 
+def test_a_clip_that_is_not_finite_or_lacks_a_bone_that_vrm_requires_is_refused() -> None:
+    clip = walker()
+    root = clip.root.copy()
+    root[3, 1] = np.nan
+    with pytest.raises(InvalidInput, match=r"^humanml3d: the clip holds NaN or infinite numbers"):
+        format_vrma(replace(clip, root=root))
+    kept = [joint for joint, name in enumerate(clip.skeleton.joint_names) if name not in ("L_wrist", "R_wrist")]
+    tree = clip.skeleton
+    armless = Skeleton(
+        "armless",
+        tuple(tree.joint_names[joint] for joint in kept),
+        tuple(kept.index(tree.parents[joint]) if joint else -1 for joint in kept),
+        tree.offsets[kept],
+        tuple(kept.index(tree.mirror[joint]) for joint in kept),
+    )
+    with pytest.raises(InvalidInput, match=r"^armless: VRM needs bones that are not found: leftHand, rightHand"):
+        format_vrma(MotionClip.of(armless, clip.rotations[:, kept], clip.root, clip.contacts, clip.fps))
+
+
 def test_a_skeleton_without_legs_is_refused() -> None:
     clip = walker()
     names = tuple(f"x{k}" for k in range(len(clip.skeleton)))
     tree = Skeleton("other", names, clip.skeleton.parents, clip.skeleton.offsets, clip.skeleton.mirror)
-    with pytest.raises(InvalidInput):
+    with pytest.raises(InvalidInput, match=r"^skeleton: no joint found for left upper leg"):
         format_vrma(replace(clip, skeleton=replace(tree, parents=(-1,) + (0,) * (len(names) - 1))))

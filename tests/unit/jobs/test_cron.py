@@ -133,6 +133,7 @@ def test_a_bad_line_is_refused_and_an_example_given(cron: str, said: str) -> Non
     with pytest.raises(InvalidInput, match=said) as caught:
         check_cron(cron)
     assert "every Monday at 03:00" in str(caught.value.hint)
+    assert caught.value.where == "cron"
 
 
 @given(st.text(max_size=40))
@@ -147,7 +148,7 @@ def test_blanks_between_fields_are_made_single() -> None:
 
 @pytest.mark.parametrize("name", ["Europe/Berlun", "", "Europe", "../UTC", "/etc/localtime", "x" * 500, "CEST2"])
 def test_an_unknown_time_zone_is_refused(name: str) -> None:
-    with pytest.raises(InvalidInput, match="no time zone"):
+    with pytest.raises(InvalidInput, match=r"^time_zone: there is no time zone"):
         check_zone(name)
 
 

@@ -13,6 +13,8 @@ from marey.core.settings import Settings
 from marey.items.item import Item
 from marey.items.values import MAX_SEED
 from marey.jobs.generators import GeneratorCapabilities, capabilities_of, new_items
+from marey.motion.edits.steps import read_steps
+from marey.takes.model_edits import EditGenerator
 from marey.text.keys import scope_key
 from marey.vocabulary.scope import ActionLists, match_scope
 from tests.support.live_api import write_bundle
@@ -52,3 +54,17 @@ def test_drawn_seeds_of_all_variants_are_seeds(
         monkeypatch.setattr(secrets, "randbelow", draw)
         assert [new.seed for new in new_items([(item, generator)])] == list(range(first, first + 8))
     assert [new.seed for new in new_items([(replace(item, seed=5), generator)])] == list(range(5, 13))
+
+
+@pytest.mark.parametrize("prompt", [UNDECIDED, "a person bows", "a person kicks a ball"])
+def test_the_scope_of_an_edit_waits_for_the_encoder_only_where_words_leave_it_undecided(
+    generator: GeneratorCapabilities, prompt: str
+) -> None:
+    steps = read_steps([{"op": "extend", "seconds": 1, "prompt": prompt}])
+    columns = EditGenerator(generator).columns(steps, "warn")
+    by_words = match_scope(prompt, LISTS)
+    assert columns["scope"] == by_words.as_json()
+    key = scope_key(prompt, generator.bundle.reference, LISTS, of_edit=True)
+    assert columns.get("scope_key") == (key if prompt == UNDECIDED else None)
+    assert (by_words.left is not None) == (prompt == UNDECIDED)
+    assert not {"scope", "scope_key"} & EditGenerator(generator).columns(steps, "ignore").keys()

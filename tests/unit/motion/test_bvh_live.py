@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import resource
 import signal
 import subprocess
@@ -33,7 +34,7 @@ REPOSITORY = Path(__file__).resolve().parents[3]
 
 @pytest.mark.parametrize("fps", [0.0, -20.0, float("nan"), float("inf")])
 def test_a_rate_that_cannot_be_is_refused_and_nothing_is_written(tmp_path: Path, fps: float) -> None:
-    with pytest.raises(InvalidInput, match="frames per second is out of range"):
+    with pytest.raises(InvalidInput, match=r"a\.bvh: .*frames per second is out of range"):
         LiveBVH(tmp_path / "a.bvh", HUMANML3D, fps)
     assert list(tmp_path.iterdir()) == []
 
@@ -249,12 +250,20 @@ def test_channels_do_not_jump_between_frames(tmp_path: Path) -> None:
 def test_a_file_that_is_there_is_refused_or_stays_until_the_first_frame(tmp_path: Path) -> None:
     path, clip = tmp_path / "a.bvh", walker()
     path.write_text("old")
-    with pytest.raises(Conflict, match="already exists"):
+    with pytest.raises(Conflict, match=r"a\.bvh: already exists"):
         LiveBVH.open(path, clip.skeleton, clip.fps)
     with LiveBVH.open(path, clip.skeleton, clip.fps, overwrite=True) as live:
         assert path.read_text() == "old"
         live.add(clip.rotations[0], clip.root[0])
         assert counted(path.read_bytes()) == 1
+
+
+def test_a_closed_file_takes_no_frame(tmp_path: Path) -> None:
+    turns, place = dancer(frames=2)
+    with LiveBVH.open(tmp_path / "a.bvh", HUMANML3D, 20) as live:
+        live.add(turns[0], place[0])
+    with pytest.raises(InvalidInput, match=r"a\.bvh, frame 1: the file is closed"):
+        live.add(turns[1], place[1])
 
 
 def test_without_a_frame_there_is_no_file(tmp_path: Path) -> None:
@@ -264,9 +273,9 @@ def test_without_a_frame_there_is_no_file(tmp_path: Path) -> None:
 
 
 def test_a_place_that_cannot_be_written_is_refused_before_the_first_frame(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInput, match="cannot be written"):
+    with pytest.raises(InvalidInput, match=r"a\.bvh: cannot be written"):
         LiveBVH.open(tmp_path / "none" / "a.bvh", HUMANML3D, 20)
-    with pytest.raises(InvalidInput, match="is a folder"):
+    with pytest.raises(InvalidInput, match=f"^{re.escape(str(tmp_path))}: is a folder"):
         LiveBVH.open(tmp_path, HUMANML3D, 20)
 
 

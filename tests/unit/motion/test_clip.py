@@ -160,16 +160,16 @@ def test_a_pickle_is_never_run(tmp_path):
 
 
 def test_a_missing_file_is_not_found_and_a_folder_no_file(tmp_path):
-    with pytest.raises(NotFound):
-        load_npz(tmp_path / "none.npz")
-    with pytest.raises(InvalidFile):
-        load_npz(tmp_path)
+    for error, path in ((NotFound, tmp_path / "none.npz"), (InvalidFile, tmp_path)):
+        with pytest.raises(error) as refused:
+            load_npz(path)
+        assert refused.value.where == str(path)
 
 
 def test_a_file_that_is_or_unpacks_to_too_much_is_not_read(monkeypatch, tmp_path):
     walker().save_npz(tmp_path / "a.npz")
     monkeypatch.setattr(clips, "MAX_UNPACKED", 1000)
-    with pytest.raises(TooLarge):
+    with pytest.raises(TooLarge, match=r"a\.npz"):
         load_npz(tmp_path / "a.npz")
     with pytest.raises(TooLarge):
         parse_npz(walker().to_npz())

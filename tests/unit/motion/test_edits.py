@@ -15,6 +15,7 @@ from marey.core.errors import InvalidInput, TooLarge
 from marey.items.timeline import timeline_text
 from marey.motion import MotionClip, edit, load_npz
 from marey.motion.arrange import placement_of
+from marey.motion.edits import editing
 from marey.motion.edits.editing import EditSource
 from marey.motion.edits.prompts import prompt_of
 from marey.motion.edits.steps import pieces_of, read_steps
@@ -316,7 +317,7 @@ def test_joined_motions_keep_both_prompts_and_the_strictest_licence():
     assert [each["licence"] for each in about["edited_from"]["sources"]] == ["CC-BY-4.0", "CC-BY-NC-4.0"]
     assert about["edited_from"]["sources"][1]["sha256"] == about["edited_from"]["ops"][0]["with"] == "ab" * 32
     shared = replace(second, manifest={"licence": "CC-BY-SA-4.0"})
-    with pytest.raises(InvalidInput, match="no licence satisfies both"):
+    with pytest.raises(InvalidInput, match=r"^licence: .*no licence satisfies both"):
         edit(whole, [{"op": "concat", "with": shared}])
 
 
@@ -407,7 +408,7 @@ def test_results_have_no_features_and_name_their_source(tmp_path):
 def test_splits_make_at_most_32_pieces():
     steps = read_steps([{"op": "split", "at": "f2"}] * 5)
     assert len(pieces_of(steps)) == 32
-    with pytest.raises(TooLarge, match="6 splits make 64 pieces"):
+    with pytest.raises(TooLarge, match=r"^ops\.5: 6 splits make 64 pieces"):
         pieces_of(read_steps([{"op": "split", "at": "f2"}] * 32)[:6])
 
 
@@ -459,8 +460,10 @@ def test_unknown_sides_are_not_mirrored():
     ],
 )
 def test_what_cannot_be_done_is_said(ops, said):
-    with pytest.raises(InvalidInput, match=said):
+    with pytest.raises(InvalidInput, match=said) as refused:
         edit(walker(), ops)
+    where, row = str(refused.value.where), next((n for n, op in enumerate(ops) if ops.count(op) == 1), None)
+    assert where.startswith("ops" if len(ops) > 9 or row is None or ops == "mirror" else f"ops.{row}")
 
 
 def test_prompts_hold_marks_that_scripts_need():
@@ -521,3 +524,33 @@ def test_an_operation_after_which_a_loop_is_one_and_a_timeline_has_its_rows():
     assert cycle == {"mirror", "speed", "in-place", "fps"}
     assert rows == {"trim", "loop", "mirror", "speed", "in-place", "reverse", "smooth", "fps", "feet"}
     assert [operation.name for operation in OPERATIONS.values() if operation.pieces] == ["split"]
+
+
+def test_a_result_of_too_many_frames_names_its_operation(monkeypatch: pytest.MonkeyPatch):
+    clip, ops = dance(1, 30), [{"op": "mirror"}, {"op": "concat", "with": dance(2, 30)}]
+    monkeypatch.setattr(editing, "MOST_FRAMES", 59)
+    assert one(clip, *ops).frames == 59
+    monkeypatch.setattr(editing, "MOST_FRAMES", 58)
+    with pytest.raises(InvalidInput, match=r"^ops\.1: the result has 59 frames; the most is 58"):
+        edit(clip, ops)
+
+
+def test_an_operation_that_generates_frames_needs_a_model():
+    with pytest.raises(InvalidInput, match=r"^ops\.1: extend generates frames, and no model is given") as refused:
+        edit(dance(1, 30), [{"op": "mirror"}, {"op": "extend", "seconds": 1}])
+    assert refused.value.argument == "model"
+
+
+@pytest.mark.parametrize(("hz", "left"), [(2.0, 0.5**0.5), (4.0, 0.5**0.125), (2 / 3, 0.5**4.5)])
+def test_smoothing_halves_the_power_of_its_frequency_and_takes_more_of_higher_ones(hz: float, left: float):
+    """A Gaussian: of n times its frequency it leaves the n-th square of that."""
+    frames = 400
+    rotations, root = dancer(1, frames)
+    swing = 0.1 * np.sin(2 * np.pi * 2.0 * np.arange(frames) / 20.0)
+    clips = (
+        MotionClip.of(HUMANML3D, rotations, root + np.outer(each, [0.0, 1.0, 0.0]), np.zeros((frames, 4), bool), 20.0)
+        for each in (swing, 0 * swing)
+    )
+    with_swing, without = (one(clip, {"op": "smooth", "hz": hz}).root[:, 1].astype(np.float64) for clip in clips)
+    middle = slice(60, -60)
+    np.testing.assert_allclose((with_swing - without)[middle], left * swing[middle], atol=2e-3)

@@ -110,8 +110,8 @@ def test_axes_are_turned_to_y_up(name: str) -> None:
 
 
 def test_left_handed_axes_are_refused() -> None:
-    with pytest.raises(InvalidFile, match="left-handed"):
-        parse_fbx_rig(scene_file([("a", -1, {})], {"FrontAxisSign": -1}))
+    with pytest.raises(InvalidFile, match=r"^hero: .*left-handed"):
+        parse_fbx_rig(scene_file([("a", -1, {})], {"FrontAxisSign": -1}), "hero")
 
 
 @pytest.mark.parametrize(
@@ -128,8 +128,8 @@ def test_left_handed_axes_are_refused() -> None:
     ],
 )  # fmt: skip
 def test_a_skeleton_that_is_none_is_refused(models, message: str) -> None:
-    with pytest.raises(InvalidInput, match=message):
-        parse_fbx_rig(scene_file(models))
+    with pytest.raises(InvalidInput, match=f"^hero: .*({message})"):
+        parse_fbx_rig(scene_file(models), "hero")
 
 
 @pytest.mark.data
@@ -221,7 +221,7 @@ def test_nodes_in_nodes_do_not_exhaust_the_stack() -> None:
 
 def test_nodes_and_properties_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fbx_parse, "MAX_ITEMS", 1000)
-    with pytest.raises(TooLarge, match="than any rig has"):
+    with pytest.raises(TooLarge, match=r"^a: .*than any rig has"):
         read_scene(format_fbx(walker(seconds=0.2)), "a")
 
 
@@ -255,3 +255,14 @@ def test_numbers_of_rates_are_those_of_the_sdk(mode: int) -> None:
     assert read_scene(scene_file([("a", -1, {})], {"TimeMode": mode}), "a.fbx").fps == pytest.approx(MODES[mode])
     if mode not in (7, 8):
         assert time_mode(MODES[mode]) == (mode, -1.0)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"), [(b"L" + bytes(8), "ends beyond its node"), (b"?", "unknown type '\\?'")]
+)
+def test_a_property_ends_in_its_node_and_has_a_known_type(content: bytes, message: str) -> None:
+    start = len(MAGIC) + 4 + 13 + 1
+    node = struct.pack("<IIIB", start + 3, 1, 3, 1) + b"a" + content
+    data = MAGIC + struct.pack("<I", 7400) + node + bytes(64)
+    with pytest.raises(InvalidFile, match=rf"^hero: a property at byte {start} .*{message}"):
+        fbx_parse.FbxFile(data, "hero")

@@ -153,8 +153,12 @@ def test_known_contacts_are_used():
 
 def test_a_skeleton_without_feet_is_refused():
     plain = Skeleton("x", ("a", "b"), (-1, 0), np.ones((2, 3), np.float32), (0, 1))
-    with pytest.raises(InvalidInput, match="feet"):
-        clean_feet(np.zeros((5, 2, 3)), plain, 30)
+    for refused in (
+        lambda: clean_feet(np.zeros((5, 2, 3)), plain, 30),
+        lambda: find_contacts(np.zeros((5, 2, 3)), plain, 30),
+    ):
+        with pytest.raises(InvalidInput, match=r"^x: .*feet"):
+            refused()
 
 
 def test_one_frame_and_other_rigs_are_cleaned():

@@ -146,12 +146,12 @@ def test_what_is_no_body_is_finished_without_nan(scale):
 def test_features_that_are_not_finite_are_refused():
     features = generated()
     features[10, 20] = np.nan
-    with pytest.raises(InvalidInput, match="NaN"):
+    with pytest.raises(InvalidInput, match=r"^humanml3d: .*NaN"):
         finish_motion(features, HUMANML3D_263)
 
 
 def test_features_of_another_shape_are_refused():
-    with pytest.raises(InvalidInput, match="shape"):
+    with pytest.raises(InvalidInput, match=r"^humanml3d-263: .*shape"):
         finish_motion(np.zeros((2, 10, 263)), HUMANML3D_263)
 
 

@@ -94,13 +94,15 @@ def test_a_root_that_is_followed_without_joints_ends_where_steps_end(seed, befor
 @pytest.mark.parametrize("bad", [np.zeros((1, 262)), np.zeros(263), np.zeros((0, 263)), np.zeros((1, 1, 263))])
 def test_features_of_another_shape_are_refused(bad):
     live = LiveDecoder(HUMANML3D_263)
-    with pytest.raises(InvalidInput, match="shape"):
+    with pytest.raises(InvalidInput, match=r"^humanml3d-263: .*shape"):
         live.run(bad, live.start())
-    with pytest.raises(InvalidInput, match="shape"):
+    with pytest.raises(InvalidInput, match=r"^humanml3d-263: .*shape"):
         live.follow(bad, live.start())
 
 
 def test_a_state_of_other_streams_is_refused():
     live = LiveDecoder(HUMANML3D_263)
-    with pytest.raises(InvalidInput, match=r"not \(3, 263\)"):
+    with pytest.raises(InvalidInput, match=r"^humanml3d-263: .*not \(3, 263\)"):
         live.step(np.zeros((2, 263)), live.start(3))
+    with pytest.raises(InvalidInput, match=r"^humanml3d-263: .*2 streams, not of one"):
+        live.run(np.zeros((4, 263)), live.start(2))

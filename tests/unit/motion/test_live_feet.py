@@ -216,11 +216,11 @@ def test_a_skeleton_without_feet_is_refused():
 
 @pytest.mark.parametrize("bad", [np.zeros((1, 21, 3)), np.full((1, 22, 3), np.nan)])
 def test_joints_that_are_none_are_refused(bad):
-    with pytest.raises(InvalidInput):
+    with pytest.raises(InvalidInput, match=r"^humanml3d: joints"):
         clean(bad)
 
 
 def test_a_state_of_other_streams_is_refused():
     live = LiveFeet(HUMANML3D, FPS)
-    with pytest.raises(InvalidInput, match="2 frames for the 3 streams"):
+    with pytest.raises(InvalidInput, match=r"^live feet: 2 frames for the 3 streams"):
         live.step(still(2), live.start(3))

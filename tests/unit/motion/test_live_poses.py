@@ -179,7 +179,7 @@ def test_joints_that_are_none_are_refused(bad):
 
 def test_a_state_of_other_streams_is_refused():
     live = LivePoses(HUMANML3D, FPS)
-    with pytest.raises(InvalidInput, match="2 frames for the 3 streams"):
+    with pytest.raises(InvalidInput, match=r"^live poses: 2 frames for the 3 streams"):
         live.step(np.zeros((2, 22, 3)), live.start(3))
 
 

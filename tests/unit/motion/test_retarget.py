@@ -16,8 +16,8 @@ from marey.motion.retarget.reference import REFERENCES, reference_rig
 from marey.motion.retarget.retarget import retarget
 from marey.motion.retarget.source import rig_of, source_of
 from marey.motion.rigs.body import RigBody
-from marey.motion.rotations import Array, angle_between, conjugate, from_rotvec, normalize, rotate
-from marey.motion.skeleton import HUMANML3D, SKELETONS
+from marey.motion.rotations import Array, angle_between, conjugate, from_rotvec, normalize, rotate, to_matrix
+from marey.motion.skeleton import HUMANML3D, SKELETONS, mirror_by_name
 from tests.support.changed_rigs import Change, lively, source_on_rig
 from tests.support.walker import walker
 
@@ -206,3 +206,23 @@ def test_the_rig_of_a_skeleton_stands_on_the_floor():
         offsets[0, 1] += 0.3
         rig = rig_of(skeleton.with_offsets(offsets))
         assert rig.positions[:, 1].min() == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_motion_that_is_not_finite_is_not_put_on_a_rig():
+    root = WALK.root.copy()
+    root[3, 1] = np.inf
+    with pytest.raises(InvalidInput, match=r"^humanml3d: the motion holds NaN or infinite numbers"):
+        retarget(source_of(replace(WALK, root=root)), load_body("mixamo"))
+
+
+@pytest.mark.parametrize("name", REFERENCES)
+def test_both_sides_of_a_reference_skeleton_are_mirrored(name):
+    rig = reference_rig(name)
+    axes, mirror = to_matrix(rig.orientations), np.array([-1.0, 1.0, 1.0])
+    pairs = [(joint, rig.index(rig.joint_names[other])) for joint, other in enumerate(mirror_by_name(rig.joint_names))]
+    sided = [(left, right) for left, right in pairs if left != right and "ik_hand" not in rig.joint_names[left]]
+    assert len(sided) > 30
+    for left, right in sided:
+        np.testing.assert_allclose(rig.positions[right], rig.positions[left] * mirror, atol=1e-9)
+        turned = np.abs(np.einsum("ia,ia->a", axes[right], mirror[:, None] * axes[left]))
+        np.testing.assert_allclose(turned, 1.0, atol=1e-6, err_msg=rig.joint_names[left])

@@ -77,5 +77,5 @@ def test_motions_without_frames_are_refused(motion):
 
 @pytest.mark.parametrize("line", ["OFFSET 0 0 0\n", "\n", "OFFSET 0 0 0 "])
 def test_an_endless_hierarchy_is_refused(line):
-    with pytest.raises(TooLarge, match="bytes before its numbers"):
-        parse_bvh_rig(b"HIERARCHY\nROOT a\n{\n" + line.encode() * 2**21)
+    with pytest.raises(TooLarge, match=r"^hero\.bvh, line \d+: .*bytes before its numbers"):
+        parse_bvh_rig(b"HIERARCHY\nROOT a\n{\n" + line.encode() * 2**21, "hero.bvh")

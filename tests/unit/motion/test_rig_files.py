@@ -19,14 +19,16 @@ from marey.motion.io.bvh_write import format_bvh
 from marey.motion.io.convert import as_motion_clip
 from marey.motion.io.glb_read import parse_glb
 from marey.motion.io.rig_bvh import parse_bvh_rig
-from marey.motion.io.rig_gltf import parse_glb_rig, parse_gltf_rig
+from marey.motion.io.rig_gltf import MAX_NODES, parse_glb_rig, parse_gltf_rig
 from marey.motion.io.rig_json import format_json_rig, parse_json_rig
+from marey.motion.io.rigged_bvh import format_rigged_bvh
 from marey.motion.io.rigged_glb import format_rigged_glb
 from marey.motion.retarget.apply import on_body
 from marey.motion.retarget.load import load_body
 from marey.motion.retarget.reference import REFERENCES, reference_rig
 from marey.motion.rigs.body import RigBody
-from marey.motion.rigs.joint_map import map_joints
+from marey.motion.rigs.joint_map import map_joints, read_map
+from marey.motion.rigs.read import read_rig
 from marey.motion.rigs.rename import renamed
 from marey.motion.rigs.report import describe
 from marey.motion.rigs.rig import MAX_JOINTS
@@ -161,7 +163,7 @@ def test_a_map_overrides_what_is_found():
     assert found.how["left_hand"] == "map"
     assert "right_toes" not in found.parts
     for wrong, message in (({"tail": "x"}, "not a part of the body"), ({"head": "nose"}, "no joint 'nose'")):
-        with pytest.raises(InvalidInput, match=message):
+        with pytest.raises(InvalidInput, match=f"^map: .*{message}"):
             map_joints(rig, wrong)
 
 
@@ -175,7 +177,7 @@ def test_a_map_overrides_what_is_found():
     ],
 )
 def test_a_map_that_leaves_no_body_is_refused(given, message):
-    with pytest.raises(InvalidInput, match=message):
+    with pytest.raises(InvalidInput, match=rf"^(?=mixamo: |map: ).*({message})"):
         map_joints(reference_rig("mixamo"), given)
 
 
@@ -279,7 +281,7 @@ def _long_name(document):
     ],
 )
 def test_a_bad_rig_is_refused_with_one_clear_message(change, kind, message):
-    with pytest.raises(kind, match=message):
+    with pytest.raises(kind, match=rf"^hero\.gltf: .*({message})"):
         RigBody.of(parse_gltf_rig(_document(change), "hero.gltf"))
 
 
@@ -316,7 +318,7 @@ def test_the_parts_of_the_largest_rigs_are_looked_for_in_few_steps(parents):
 
 
 def test_too_many_joints_are_refused_before_they_are_read():
-    with pytest.raises(TooLarge, match="30000 joints"):
+    with pytest.raises(TooLarge, match=r"^x\.json: 30000 joints"):
         parse_json_rig(_json_rig([-1] * 30_000), "x.json")
 
 
@@ -326,7 +328,100 @@ def test_names_with_a_prefix_many_times_are_read(prefix):
     assert len(read_names(names)) == 3
 
 
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda document: document.update(format="rig"), "is not a rig of version 1"),
+        (lambda document: document.update(version=2), "is not a rig of version 1"),
+        (lambda document: document.pop("joints"), "is not a rig: KeyError"),
+        (lambda document: document.update(up="x"), "its axis y or z"),
+        (lambda document: document.update(unit=1e-7), "must be metres as a number"),
+        (lambda document: document.update(unit=1e7), "must be metres as a number"),
+        (lambda document: document["joints"][1].update(name="j0"), "two joints have one name"),
+        (lambda document: document["joints"][1].update(parent="j9"), "'j1' hangs on 'j9', which is not there"),
+        (lambda document: document["joints"][1].update(rotation=[2, 0, 0, 0]), "the rotation of 'j1' is no unit"),
+        (lambda document: document["joints"][1].update(rotation=[1, 0, 0]), "is not a rig: ValueError"),
+    ],
+)
+def test_a_bad_rig_in_json_is_refused_with_one_clear_message(change, message):
+    document = json.loads(_json_rig([-1, 0, 1]))
+    assert len(parse_json_rig(json.dumps(document).encode(), "x.json")) == 3
+    change(document)
+    with pytest.raises(InvalidFile, match=rf"^x\.json: .*{message}"):
+        parse_json_rig(json.dumps(document).encode(), "x.json")
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1e6])
+def test_the_smallest_and_the_largest_unit_are_read(unit):
+    document = json.loads(_json_rig([-1, 0, 1])) | {"unit": unit}
+    document["joints"] = [{**joint, "position": [0, 0, 0]} for joint in document["joints"]]
+    assert parse_json_rig(json.dumps(document).encode(), "x.json").unit == unit
+
+
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        (lambda data: b"gltf" + data[4:], "is not a glb file"),
+        (lambda data: data[:19], "is not a glb file"),
+        (lambda data: data[:4] + b"\1" + data[5:], "is glTF 1; only glTF 2 is read"),
+        (lambda data: data.replace(b"JSON", b"JSOM", 1), "is cut off, or its chunks are broken"),
+        (lambda data: data[:-1], "is cut off, or its chunks are broken"),
+    ],
+)
+def test_a_rig_of_a_broken_glb_is_refused(damage, message):
+    data = format_rigged_glb(on_body(walker(seconds=0.1), load_body("mixamo")))
+    with pytest.raises(InvalidFile, match=rf"^x\.glb: {message}"):
+        parse_glb_rig(damage(data), "x.glb")
+
+
+@pytest.mark.parametrize("children", [[[1, 2], [2]], [[1], [1]], [[9], []], [[-1], []]])
+def test_nodes_of_two_parents_or_of_none_are_refused(children):
+    document = {"nodes": [{"name": f"n{n}", "children": each} for n, each in enumerate([*children, []])]}
+    with pytest.raises(InvalidFile, match=r"^x\.gltf: the node -?\d has two parents, or is not there"):
+        parse_gltf_rig(json.dumps(document).encode(), "x.gltf")
+
+
+def test_more_nodes_than_any_scene_has_are_refused():
+    document = {"nodes": [{}] * (MAX_NODES + 1)}
+    with pytest.raises(InvalidFile, match=rf"^x\.gltf: {MAX_NODES + 1} nodes, over the limit of {MAX_NODES}"):
+        parse_gltf_rig(json.dumps(document).encode(), "x.gltf")
+
+
+@pytest.mark.parametrize("document", [[], "hips", None, {"hips": 1}, {"hips": ["Hips"]}])
+def test_a_map_that_is_none_is_refused(document):
+    with pytest.raises(InvalidInput, match=r"^map\.json: is not an object of parts and joint names"):
+        read_map(document, "map.json")
+    assert read_map({"hips": "Hips", "left_toes": None}, "map.json") == {"hips": "Hips", "left_toes": None}
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"left_hand": "mixamorig:Head", "head": "mixamorig:Head"}, "map: gives one joint to two parts"),
+        (
+            {"left_foot": "mixamorig:RightFoot", "right_foot": "mixamorig:LeftFoot"},
+            "mixamo: the joints of the left leg do not hang on each other",
+        ),
+        ({"left_lower_leg": "mixamorig:LeftArm"}, "mixamo: the joints of the left leg do not hang on each other"),
+    ],
+)
+def test_a_map_that_gives_a_joint_twice_or_crosses_the_legs_is_refused(given, message):
+    with pytest.raises(InvalidInput, match=f"^{message}"):
+        map_joints(reference_rig("mixamo"), given)
+
+
+@pytest.mark.parametrize("format_motion", [format_rigged_bvh, format_rigged_glb])
+def test_a_motion_on_a_rig_that_is_not_finite_is_not_written(format_motion):
+    motion = on_body(walker(seconds=0.2), load_body("mixamo"))
+    rotations = motion.rotations.copy()
+    rotations[1, 3, 2] = np.nan
+    with pytest.raises(InvalidInput, match=r"^mixamo: the motion holds NaN or infinite numbers"):
+        format_motion(replace(motion, rotations=rotations))
+
+
 def test_a_rig_that_is_not_there(tmp_path):
+    with pytest.raises(InvalidInput, match=r"hero\.txt: `\.txt` is not a rig format"):
+        read_rig(tmp_path / "hero.txt")
     with pytest.raises(InvalidInput, match="there is no rig 'mixano'"):
         load_body("mixano")
     with pytest.raises(NotFound):
@@ -340,7 +435,7 @@ def test_a_rig_that_is_not_there(tmp_path):
 
 def test_a_glb_whose_chunk_claims_more_than_the_file_holds():
     data = format_rigged_glb(on_body(WALK, load_body("mixamo")))
-    with pytest.raises(InvalidFile, match="cut off"):
+    with pytest.raises(InvalidFile, match=r"^x\.glb: is cut off"):
         parse_glb_rig(data[:12] + struct.pack("<I", 2**31) + data[16:], "x.glb")
 
 
@@ -415,3 +510,24 @@ def test_a_report_says_what_became_of_every_joint():
         assert report["parts"]["left_foot"]["joint"] == body.rig.joint_names[body.map.parts["left_foot"]]
         for joint, role in roles.items():
             assert report["others"][joint].startswith(role)
+
+
+def test_bones_without_a_stated_end_are_short_and_go_on_as_the_last_one():
+    motion = on_body(walker(seconds=0.1), load_body("humanik"))
+    lines = format_rigged_bvh(motion).splitlines()
+    ends = [at for at, line in enumerate(lines) if "End Site" in line]
+    assert len(ends) > 10
+    for at in ends:
+        last, end = (np.array(lines[row].split()[1:], float) for row in (at - 2, at + 2))
+        assert 2 < np.linalg.norm(end) < 8
+        assert last @ end == pytest.approx(np.linalg.norm(last) * np.linalg.norm(end), rel=1e-4)
+
+
+def test_of_two_joints_of_one_word_the_first_is_the_part():
+    bare = reference_rig("mixamo")
+    own = replace(bare, joint_names=tuple(name.replace("mixamorig:", "hero_") for name in bare.joint_names))
+    rig = _with_joint(own, "hero_Head2", "hero_Head", "hero_HeadTop_End")
+    rig = _with_joint(rig, "hero_Hips2", "hero_Hips", "hero_Spine")
+    found = map_joints(rig)
+    assert rig.joint_names[found.parts["head"]] == "hero_Head"
+    assert rig.joint_names[found.parts["hips"]] == "hero_Hips"

@@ -43,8 +43,9 @@ def test_a_usd_rig_needs_its_extra(name, monkeypatch):
 def test_a_child_that_fails(code, kind, message, monkeypatch):
     monkeypatch.setitem(sys.modules, "pxr", types.ModuleType("pxr"))
     monkeypatch.setattr(rig_usd.subprocess, "run", lambda *_, **__: subprocess.CompletedProcess([], code, b"", b"oh"))
-    with pytest.raises(kind, match=message):
+    with pytest.raises(kind, match=message) as failed:
         parse_rig(DATA, "hero.usd")
+    assert "hero.usd" in str(failed.value)
 
 
 def test_a_child_that_hangs(monkeypatch):
@@ -53,7 +54,7 @@ def test_a_child_that_hangs(monkeypatch):
 
     monkeypatch.setitem(sys.modules, "pxr", types.ModuleType("pxr"))
     monkeypatch.setattr(rig_usd.subprocess, "run", hang)
-    with pytest.raises(TooLarge, match="takes more than 10 s"):
+    with pytest.raises(TooLarge, match=r"^hero\.usd: takes more than 10 s"):
         parse_rig(DATA, "hero.usd")
 
 
@@ -68,7 +69,7 @@ def test_a_child_gets_no_settings(monkeypatch):
     monkeypatch.setattr(rig_usd.subprocess, "run", run)
     monkeypatch.setenv("MAREY_MASTER_KEY", "secret")
     monkeypatch.setenv("PXR_PLUGINPATH_NAME", "/plugins")
-    with pytest.raises(InvalidFile, match="no"):
+    with pytest.raises(InvalidFile, match=r"^hero\.usd: no"):
         parse_rig(DATA, "hero.usd")
     assert seen
     assert not [name for name in seen if name.startswith(("MAREY_", "PXR_"))]

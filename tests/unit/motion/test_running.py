@@ -117,8 +117,21 @@ def test_a_finished_run_stands_on_its_steps_and_falls_between_them() -> None:
 
 def test_a_body_that_falls_in_its_flights_already_is_nearly_left() -> None:
     joints = sliding(1.0, Body(4.0, speed=steady(2.6), duty=0.3, cadence=2.6).joints())
-    contacts = with_running_steps(joints, contacts_of(joints), HUMANML3D, FPS)
-    once = with_flights(joints, contacts, HUMANML3D, FPS)
-    again = with_flights(once, contacts, HUMANML3D, FPS)
+    contacts = with_running_steps(joints, contacts_of(joints), going(joints), HUMANML3D, FPS)
+    once = with_flights(joints, contacts, going(joints), HUMANML3D, FPS)
+    again = with_flights(once, contacts, going(once), HUMANML3D, FPS)
     first, second = (np.abs(np.diff(change[:, 0, 1])).max() for change in (once - joints, again - once))
     assert second < 0.7 * first
+
+
+def test_a_run_between_stands_passes_into_them_without_a_jump() -> None:
+    joints = sliding(1.0, Body(4.0, speed=steady(2.6), duty=0.3, cadence=2.6).joints())
+    steps = with_running_steps(joints, contacts_of(joints), going(joints), HUMANML3D, FPS)
+    stand = np.ones((30, 4), bool)
+    whole = np.concatenate([np.repeat(joints[:1], 30, axis=0), joints, np.repeat(joints[-1:], 30, axis=0)])
+    moved = with_flights(whole, np.concatenate([stand, steps, stand]), going(whole), HUMANML3D, FPS)
+    change = np.abs(moved - whole)[:, 0, 1]
+    first, *_, last = np.flatnonzero(change)
+    assert 0 < first < last < len(whole) - 1
+    assert change[[first, last]].max() < 1e-6
+    assert change.max() > 0.01

@@ -115,8 +115,14 @@ def test_skeleton_of_knows_ours_and_makes_others():
     ],
 )
 def test_a_tree_that_is_none_is_refused(names, parents):
-    with pytest.raises(InvalidInput):
+    with pytest.raises(InvalidInput, match=r"^x: "):
         Skeleton("x", names, parents, np.zeros((len(names), 3), np.float32), tuple(range(len(names))))
+
+
+@pytest.mark.parametrize("shape", [(1, 3), (3, 3), (2, 2), (2,)])
+def test_offsets_of_another_shape_are_refused(shape) -> None:
+    with pytest.raises(InvalidInput, match=r"^x: offsets have shape .*, not \(2, 3\)"):
+        Skeleton("x", ("a", "b"), (-1, 0), np.zeros(shape, np.float32), (0, 1))
 
 
 def test_of_two_sides_in_a_name_the_first_is_swapped() -> None:

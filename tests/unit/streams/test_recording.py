@@ -36,5 +36,5 @@ def test_text_features_are_no_recording() -> None:
     "damage", [lambda blob: blob[:-7], lambda blob: b"", lambda blob: blob.replace(b"prompts", b"prompt_")]
 )
 def test_a_damaged_recording_is_refused(damage: object) -> None:
-    with pytest.raises(InvalidFile, match="not a recording"):
+    with pytest.raises(InvalidFile, match=r"^recording: .*not a recording"):
         StreamRecording.from_blob(damage(recording().to_blob()))  # pyright: ignore

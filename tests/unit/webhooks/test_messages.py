@@ -113,7 +113,7 @@ def test_a_sealed_secret_opens_with_its_key_also_behind_a_newer_one() -> None:
     assert b"whsec" not in sealed
     assert Vault(f"{new}\n{old}").decrypt(sealed) == "whsec_abc"
     assert Vault(new).decrypt(Vault(f"{new},{old}").encrypt("whsec_abc")) == "whsec_abc"
-    with pytest.raises(InvalidInput, match="does not open"):
+    with pytest.raises(InvalidInput, match=r"^MAREY_WEBHOOK_KEY: does not open"):
         Vault(new).decrypt(sealed)
 
 

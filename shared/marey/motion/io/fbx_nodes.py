@@ -57,10 +57,6 @@ class FbxNode:
     block: bool = field(default=False, repr=False)
     content: bytes | None = field(default=None, init=False, repr=False)
 
-    def first(self, name: str) -> FbxNode | None:
-        """Return the first child of a name."""
-        return next((child for child in self.children if child.name == name), None)
-
 
 def node(
     name: str, *properties: Property, below: tuple[FbxNode, ...] | list[FbxNode] = (), block: bool = False
