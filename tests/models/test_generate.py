@@ -1,4 +1,4 @@
-"""Progress of every model's generator: each step once, in whole batches and in those that lose a request."""
+"""Every model's generator: its progress, and what its settings change."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from typing import Any
 
 import pytest
 
+from marey.core.errors import InvalidInput
 from marey.generation.port import Request
-from marey.registry import model_names
-from tests.support.generating import Dropping
+from marey.registry import Setting, get_model, model_names
+from tests.support.generating import Dropping, equal_motions
 from tests.support.models import load, random_bundle
 from tests.support.prepared import text_features
 
@@ -54,3 +55,31 @@ def test_a_request_that_is_dropped_at_once_leaves_the_others(generator: Any) -> 
     assert [(each.tokens == kept.tokens).all() for each, kept in ((made[0], whole[0]), (made[2], whole[2]))] == [1, 1]
     assert control.steps[-1][0] == control.steps[-1][1]
     assert generator.generate(asked[:1], control=Dropping(0)) == [None]
+
+
+def test_each_setting_changes_what_is_drawn(generator: Any) -> None:
+    """A switch between the network and something else is none of these."""
+    asked = [Request(text_features(seed), seed, generator.limits.max_frames) for seed in range(2)]
+    spec = get_model(generator.bundle.manifest.model)
+    described = generator.describe_settings(generator.settings({}))
+    own = {each.name: described[each.name] for each in spec.settings}
+    usual = generator.generate(asked)
+    assert equal_motions(usual, generator.generate(asked, generator.settings(own))), "the bundle's own values"
+    for setting in spec.settings:
+        if setting.whole and (setting.low, setting.high) == (0, 1):
+            continue
+        near = own[setting.name] - 1 if setting.whole else own[setting.name] / 2
+        others = (drawn(generator, asked, setting, value) for value in (setting.low, near, setting.high))
+        assert any(not equal_motions(usual, made) for made in others if made is not None), setting.name
+
+
+def drawn(generator: Any, asked: Sequence[Request], setting: Setting, value: float) -> Sequence[Any] | None:
+    """Motions with another value of a setting; None where the others exclude it, or where it takes many passes."""
+    try:
+        settings = generator.settings({setting.name: int(value) if setting.whole else value})
+    except InvalidInput:
+        return None
+    if setting.whole and value == setting.high:
+        return None
+    assert generator.describe_settings(settings)[setting.name] == value
+    return generator.generate(asked, settings)

@@ -1,4 +1,4 @@
-"""Entries of the registry, held to the code of every model."""
+"""Registry entries of all models, held to their code."""
 
 from __future__ import annotations
 

@@ -23,6 +23,8 @@ WHOLE = {
     "spec.py": "tests/contracts/test_contracts.py",
 }
 """Tests that hold a whole kind of file, by its name, to something else, without a use of any name in it."""
+OF_VALUES = frozenset({"ablation.py", "config.py", "spec.py"})
+"""Files whose values tests read as a table: those in files of the same name, beside the module's own tests or above."""
 
 
 class Selector:
@@ -57,9 +59,7 @@ class Selector:
         # The line runs once, when its module is imported: tests that run what uses it stand in.
         if isinstance(chain_of_nodes[0] if chain_of_nodes else None, ast.arguments):
             return self.map.covering(mutation.path, _runtime_lines(chain_of_nodes[1]))
-        whole = {
-            name for name, test in self.map.tests.items() if test.passed and test.file == WHOLE.get(_name(mutation))
-        }
+        whole = {name for name, test in self.map.tests.items() if test.passed and _holds(test.file, mutation.path)}
         for names in self._stand_ins(tree, mutation, chain_of_nodes):
             if names:
                 return names | whole
@@ -138,12 +138,17 @@ class Selector:
         return chosen
 
 
-def _name(mutation: Mutation) -> str:
-    return Path(mutation.path).name
-
-
 def _in_turn(files: Iterable[list[str]]) -> list[str]:
     return [name for names in zip_longest(*files) for name in names if name]
+
+
+def _holds(test: str, path: str) -> bool:
+    """Return True for a file of tests that holds all values of a file of the product."""
+    module, file = Path(path), Path(test)
+    if test == WHOLE.get(module.name):
+        return True
+    beside = {"tests", "unit", *module.parent.parts}.issuperset(file.parent.parts)
+    return module.name in OF_VALUES and file.name == f"test_{module.name}" and beside
 
 
 @lru_cache(maxsize=100_000)

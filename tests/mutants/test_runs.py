@@ -198,6 +198,18 @@ def test_a_test_of_every_function_comes_before_more_cases_of_one(tmp_path: Path)
     assert chosen == [f"{file}::test_quick[0]", f"{file}::test_quick[1]", f"{file}::test_slow"]
 
 
+def test_values_of_a_configuration_are_held_by_tests_of_its_name_beside_those_of_its_module(tmp_path: Path) -> None:
+    path = "workers/marey/models/dancer/config.py"
+    (tmp_path / path).parent.mkdir(parents=True)
+    (tmp_path / path).write_text("SMALL = Config(width=32)\n")
+    files = ["tests/models/test_config.py", "tests/models/dancer/test_config.py", "tests/contracts/test_contracts.py"]
+    others = ["tests/models/singer/test_config.py", "tests/models/dancer/test_model.py"]
+    tests = {f"{file}::test_same": RecordedTest(file, 1.0, (), passed=True) for file in files + others}
+    select = Selector(tmp_path, LineMap("", tests, {}, {})).select
+    for mutation in mutations(path, (tmp_path / path).read_bytes()):
+        assert set(select(mutation)) == {f"{file}::test_same" for file in files}
+
+
 def test_the_map_is_read_as_it_was_written(tmp_path: Path, known: LineMap) -> None:
     known.save(tmp_path / "map.json")
     again = LineMap.load(tmp_path / "map.json")

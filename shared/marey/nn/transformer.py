@@ -44,7 +44,7 @@ def dropout(x: Tensor, rate: float, *, training: bool) -> Tensor:
     if x.device.type != "cpu":
         return F.dropout(x, rate)
     cut = round(rate * 256)
-    words = torch.empty(-(-x.numel() // 8), dtype=torch.int64).random_(-(2**63), None)
+    words = torch.empty(-(-x.numel() // 8), dtype=torch.int64, device=x.device).random_(-(2**63), None)
     kept = words.view(torch.uint8)[: x.numel()].view(x.shape) >= cut
     return x * (kept.to(x.dtype) * (256 / (256 - cut)))
 

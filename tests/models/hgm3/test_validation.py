@@ -1,4 +1,4 @@
-"""Reports of validation, and rows that decoding leaves out."""
+"""Validation figures of networks that know nothing, and passes that decoding leaves out."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ def of_actions(count: int) -> TextFeatures:
 
 
 def started_with(generator: Generator, request: Request, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
-    """Return what the stream of a request is started with."""
+    """Arguments that the stream of a request is started with."""
     found = dict[str, Any]()
     plain = StreamBatch.start
 

@@ -20,7 +20,7 @@ from marey.models.mogo.level_token import build_transformer
 from marey.models.mogo.memory import memory_model
 from marey.models.mogo.model import NOT_ASKED, RQHCTransformer, next_targets
 from marey.models.mogo.rollouts import Rollouts
-from marey.models.mogo.samples import MIN_FRAMES, Samples, TokenSpan
+from marey.models.mogo.samples import BEFORE_SEAM, MIN_FRAMES, Samples, TokenSpan
 from marey.models.mogo.stage_transformer import TransformerStage
 from marey.models.mogo.steers import LEAST_ENTERED, load_steers
 from marey.models.mogo.tokenizer import Tokenizer
@@ -290,3 +290,20 @@ def test_validation_of_a_network_that_knows_nothing_is_that_of_chance(stage: Tra
         assert found[f"loss/{level}"] == pytest.approx(math.log(codes), rel=1e-4)
         assert found[f"accuracy/{level}"] == pytest.approx(1 / codes, rel=1e-3)
     assert found["accuracy/0"] == pytest.approx(1 / (codes + 1), rel=1e-3)
+
+
+@pytest.mark.parametrize(("frames", "most"), [(MIN_FRAMES, 0), (MIN_FRAMES + 1, 1), (MIN_FRAMES + 5, 5)])
+def test_a_crop_leaves_the_shortest_motion_and_may_take_a_single_frame(
+    frames: int, most: int, stage: TransformerStage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stage.samples, "crops", 1.0)
+    whole = TokenSpan(first=7, frames=frames, skipped=0, before=1, after=1, seam=0, ends=True)
+    found = {stage.samples._cut(whole, np.random.default_rng(seed)).skipped for seed in range(60)}
+    assert found == (set(range(1, most + 1)) or {0})
+
+
+def test_a_crop_ends_before_the_seam(stage: TransformerStage, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stage.samples, "crops", 1.0)
+    whole = TokenSpan(first=7, frames=22, skipped=0, before=1, after=2, seam=12, ends=True)
+    found = [stage.samples._cut(whole, np.random.default_rng(seed)) for seed in range(60)]
+    assert {each.seam for each in found} == set(range(BEFORE_SEAM, 12))

@@ -23,6 +23,7 @@ from marey.models.momaskpp.generate import Generator
 from marey.models.momaskpp.memory import memory_model
 from marey.models.momaskpp.scales import Scales
 from marey.models.momaskpp.stage_masked import ScaleStage, choose_masks
+from marey.models.momaskpp.stage_refiner import RefinerStage
 from marey.models.momaskpp.stage_tokenizer import ScaleTokenizerStage, has_positions, tokenizer_loss
 from marey.models.momaskpp.tokenizer import Tokenizer
 from marey.models.momaskpp.tokens import ScaleTokens, encode_clips
@@ -34,6 +35,7 @@ from marey.training.parts import load_part
 from marey.training.stages import StepContext
 from marey.training.staging import TrainOptions
 from tests.support.device_memory import device_with_room_for
+from tests.support.devices import check_training_elsewhere
 from tests.support.prepared import farthest_move, text_features, write_prepared
 from tests.support.recording import assert_recordable
 
@@ -372,7 +374,7 @@ def test_the_root_counts_once_more_by_its_weight(prepared: PreparedData) -> None
     output = model(features, lengths)[0]
     error = torch.nn.functional.smooth_l1_loss(output, model.normalize(features), reduction="none")[..., :4]
     own = torch.cat([error[0], error[1, :20]]).mean()
-    assert total(3.0) - total(0.0) == pytest.approx(3 * float(own), rel=1e-3)
+    assert total(3.0) - total(0.0) == pytest.approx(3 * float(own.detach()), rel=1e-3)
 
 
 def test_errors_of_features_without_positions_are_those_of_whole_tokens_of_each_captured_clip(
@@ -404,3 +406,12 @@ def test_a_network_that_knows_nothing_is_right_by_chance(prepared: PreparedData,
     found = stage.validate()
     assert found["loss"] == pytest.approx(math.log(TINY.tokenizer.codes), rel=1e-4)
     assert 0 <= found["accuracy"] < 0.5
+
+
+def test_no_tensor_of_a_training_is_made_on_another_device(prepared: PreparedData, words: WordData) -> None:
+    data = MotionData.load(prepared.path, CPU)
+    for layout in ("own", "padded"):
+        config = replace(TINY, tokenizer=replace(TINY.tokenizer, layout=layout))
+        check_training_elsewhere(ScaleTokenizerStage(config, data, Tokenizer(config)))
+        check_training_elsewhere(masked_stage(prepared, words, config))
+    check_training_elsewhere(RefinerStage(TINY, data))

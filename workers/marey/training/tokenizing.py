@@ -231,7 +231,8 @@ class WindowStage(ABC, Generic[C, M]):
         in space."""
         features, lengths = self.windows.draw(context.rng)
         device = features.device
-        return features, torch.from_numpy(lengths).to(device), torch.tensor(world_share(context.fraction)).to(device)
+        world = torch.tensor(world_share(context.fraction), device=device)
+        return features, torch.from_numpy(lengths).to(device), world
 
     @abstractmethod
     def batch_loss(self, batch: tuple[Tensor, Tensor, Tensor]) -> tuple[Tensor, Mapping[str, Tensor]]:

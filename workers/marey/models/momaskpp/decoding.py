@@ -81,8 +81,9 @@ def decode(
 
 
 def bucket_positions(scales: Scales, bucket: int) -> Tensor:
-    """Return the positions (S,) that a clip of `bucket` tokens has in the row of all scales."""
-    return scales.valid(torch.tensor([bucket]))[0].nonzero().squeeze(1)
+    """Return the positions (S,) that a clip of `bucket` tokens has in the row of all scales; on the CPU on every
+    device."""
+    return scales.valid(torch.tensor([bucket], device="cpu"))[0].nonzero().squeeze(1)
 
 
 def _positions(items: ScaleItems, scales: Scales) -> Tensor:
