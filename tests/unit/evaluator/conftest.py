@@ -21,7 +21,7 @@ from tests.support.texts import pipelines_share_parts
 ACTS = tuple(f"{verb} {place}" for verb in ("walks", "runs", "waves", "bows") for place in ("here", "there", "away"))
 
 
-@pytest.fixture(autouse=True, scope="package")
+@pytest.fixture(autouse=True, scope="module")
 def _shared_parts() -> Iterator[None]:
     with pipelines_share_parts():
         yield
