@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,7 +12,7 @@ import torch
 from marey.data.prepared import PreparedData
 from marey.models.hgm3 import decoding
 from marey.models.hgm3.conditions import ACTION, MOTION, SPECIFIC
-from marey.models.hgm3.config import TINY, HGM3Config, named_config
+from marey.models.hgm3.config import TINY, HGM3Config
 from marey.models.hgm3.data import CaptionData
 from marey.models.hgm3.decoding import DecodeOptions, Items
 from marey.models.hgm3.generate import Generator
@@ -21,11 +20,8 @@ from marey.models.hgm3.model import MaskedTransformer
 from marey.models.hgm3.stage_masked import MaskedSample, MaskedStage, _pieces
 from marey.models.hgm3.stage_residual import ResidualSample, ResidualStage, piece_losses
 from marey.models.hgm3.tokenizer import Tokenizer
-from marey.models.hgm3.train import train_stage
-from marey.training.budget import Budget
 from marey.training.motions import MotionData, TokenData
 from marey.training.stages import StepContext
-from marey.training.staging import TrainOptions
 from marey.training.texts import CaptionTexts
 from marey.training.tokenizing import TokenizerStage, tokenizer_loss
 from tests.support.prepared import text_features
@@ -266,15 +262,6 @@ def test_masked_tokens_are_shown_as_mask_as_another_or_as_they_are(random: float
     assert not shown[~masked].any()
     names = {config.tokenizer.codes: "mask", 0: "same"}
     assert {names.get(int(token), "other") for token in shown[masked]} - ({"same"} if random else set()) == kinds
-
-
-def test_a_stage_joins_the_other_processes_first(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    def joined() -> None:
-        raise InterruptedError
-
-    monkeypatch.setattr("marey.models.hgm3.train.start_process_group", joined)
-    with pytest.raises(InterruptedError):
-        train_stage("masked", TrainOptions(tmp_path, tmp_path, named_config("tiny"), Budget(1)))
 
 
 def test_the_first_code_is_a_target_like_any_other(prepared: PreparedData) -> None:

@@ -50,7 +50,7 @@ def between_stances(
             Where a foot moves beside the cut, nothing is changed.
     """
     joints, stood = (layout.decode(each).astype(np.float64) for each in (features, cut))
-    stepped, contacts = joints.copy(), layout.contacts(features).copy()
+    stepped, contacts = joints.copy(), layout.contacts(features)
     for begin, end in spans:
         if not _stands(stood, layout.fps, begin, end):
             continue
