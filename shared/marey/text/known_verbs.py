@@ -41,10 +41,11 @@ _FREEZES_THEN = re.compile(
     re.IGNORECASE,
 )
 """The same behind another movement."""
-_CHILL = r"cold|freezing|snow\w*|ic[ey]\w*|winter|blizzard|frost\w*|shiver\w*|death"
-_COLD = re.compile(rf"\b(?:{_CHILL})\b", re.IGNORECASE)
-_COLD_FIRST = re.compile(rf"\b(?:{_CHILL}|winter\w*|arctic|teeth|trembl\w*)\b", re.IGNORECASE)
-"""Words of who is cold: by more words where a prompt begins with it."""
+_COLD = re.compile(
+    r"\b(?:cold|freezing|snow\w*|ic[ey]\w*|winter\w*|arctic|blizzard|frost\w*|shiver\w*|trembl\w*|teeth|death)\b",
+    re.IGNORECASE,
+)
+"""Words of who is cold, not still."""
 
 
 def with_known_verbs(prompt: str) -> str:
@@ -53,16 +54,16 @@ def with_known_verbs(prompt: str) -> str:
         behind = _WAYS[verb][2]
         prompt = pattern.sub(lambda found, behind=behind: f"{_forms()[found['verb'].lower()]}{behind}", prompt)
     prompt = _SITS.sub(_sits, prompt)
-    if _COLD_FIRST.search(_FREEZES.sub("", prompt)):
+    if _COLD.search(_FREEZES.sub("", prompt)):
         return prompt
-    return _FREEZES.sub(lambda it: f"{it['who']}stand{'ing' if it['ing'] else it['s'] or ''} still", prompt)
+    return _FREEZES.sub(lambda it: f"{it['who']}stand{'ing' if it['ing'] else (it['s'] or '').lower()} still", prompt)
 
 
 def with_sudden_stops(prompt: str) -> str:
     """Return a prompt in which a body that freezes behind another movement stands still, unless someone is cold."""
     if _COLD.search(prompt):
         return prompt
-    return _FREEZES_THEN.sub(lambda it: f"{it['joint']}stand{it['s'] or ''} still", prompt)
+    return _FREEZES_THEN.sub(lambda it: f"{it['joint']}stand{(it['s'] or '').lower()} still", prompt)
 
 
 def _sits(found: re.Match[str]) -> str:

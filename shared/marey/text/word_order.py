@@ -36,5 +36,5 @@ def in_usual_order(prompt: str) -> str:
 def _taken(found: re.Match[str]) -> str:
     """Return a way of some steps as steps that are taken."""
     end = (found["end"] or "").lower()
-    takes = "taking" if end == "ing" else "takes" if end else "take"
+    takes = "taking" if end.endswith("ing") else "takes" if end else "take"
     return f"{takes} {found['steps']} {found['way']}"

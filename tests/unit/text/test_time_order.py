@@ -75,6 +75,7 @@ def test_who_goes_on_does_so_again(prompt: str, read: str) -> None:
         ("1. bow", "1. bow"),
         ("creeps up, freezes, and listens", "creeps up, stands still, and listens"),
         ("walks through the snow, freezes", "walks through the snow, freezes"),
+        ("crosses the arctic plain, freezes", "crosses the arctic plain, freezes"),
         ("turn left, turn right, turn left", "turn left, then turn right, then turn left"),
         ("turn left, walk right", "turn left, walk right"),
         ("Jab, cross, roundhouse kick", "Jab, cross, then roundhouse kick"),

@@ -30,6 +30,7 @@ def test_the_foot_comes_before_the_number(prompt: str, read: str) -> None:
         ("turns left 90 degrees", "turns left 90 degrees"),
         ("she walks back a few steps", "she takes a few steps back"),
         ("moving forward several small steps", "taking several small steps forward"),
+        ("he is stepping back a few steps", "he is taking a few steps back"),
         ("walks back to the steps", "walks back to the steps"),
     ],
 )

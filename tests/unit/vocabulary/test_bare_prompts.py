@@ -107,6 +107,8 @@ def test_verbs_of_seeming_go_with_what_they_say(prompt: str, left: str) -> None:
         ("flaps her arms slowly like a swan", "", ["arms-flapped"]),
         ("pulls her left arm across her chest", "", ["arm-across-stretch"]),
         ("throws up into a bucket", "", ["vomit"]),
+        ("dry-heaves", "", ["vomit"]),
+        ("a man is dry heaving", "", ["vomit"]),
         ("clutches his chest in pain", "", ["hand-on-heart"]),
         ("hears a noise and turns around", "hears a noise and turns around", []),
         ("lifts a glass to the lips", "lifts a glass to the lips", []),

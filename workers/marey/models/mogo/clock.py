@@ -26,7 +26,7 @@ class Clock(nn.Module):
         Args:
             width: w, of the embedding.
             farthest: D, frames beyond which all times share one embedding.
-            untold: share of actions whose time training hides.
+            hidden_share: share of actions whose time training hides.
         """
         super().__init__()
         self.hidden_share = hidden_share
