@@ -32,8 +32,7 @@ from marey.generation.shots.windows import Float32, FrameGap, crossfaded, fill, 
 from marey.generation.stated import STATED
 from marey.generation.timed import CUT_SHARE, TimedText, part_seed
 from marey.generation.wish import Wish
-from marey.motion.features import FeatureLayout, HeadingLayout
-from marey.motion.skeleton import HUMANML3D
+from marey.motion.features import FeatureLayout
 from marey.quality.postures import RISE
 from marey.text.features import TextFeatures
 from marey.vocabulary.courses import RUNS, STRAIGHT
@@ -195,11 +194,9 @@ def joined(
         # A window may end with frames that the others have no place for.
         made = window.features[: len(whole) - a + window.first]
         whole = crossfaded(whole, replace(window, features=lifted(made, floor, layout)), a - window.first)
-    if isinstance(layout, HeadingLayout) and layout.skeleton.name == HUMANML3D.name:
-        steps = min(STEPS, len(new) // 2)
-        whole = between_stances(whole, layout, cut, [(start, start + steps), (end - steps, end)])
-        whole = with_steps(whole, layout, [(a, b) for a, b, *_ in found])
-    return whole
+    steps = min(STEPS, len(new) // 2)
+    whole = between_stances(whole, layout, cut, [(start, start + steps), (end - steps, end)])
+    return with_steps(whole, layout, [(a, b) for a, b, *_ in found])
 
 
 def _pelvis(features: Float32, layout: FeatureLayout, raised: float = 0.0) -> float:

@@ -8,17 +8,19 @@ its time, and goes there in an arc.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
 
 from marey.generation.shots.flowing import LIFT_M, steps_between
 from marey.generation.shots.windows import CROSSFADE
-from marey.motion.features import HeadingLayout
+from marey.motion.features import FeatureLayout, HeadingLayout
 from marey.motion.feet import runs
 from marey.motion.filters import smooth
 from marey.motion.kinematics import facing
 from marey.motion.legs import two_bone_knee
+from marey.motion.skeleton import HUMANML3D
 from marey.posing.limbs import LEVEL
 from marey.posing.standing import LEGS
 
@@ -38,17 +40,19 @@ PASSES_S = 0.04
 
 
 def between_stances(
-    features: Float32, layout: HeadingLayout, cut: Float32, spans: Sequence[tuple[int, int]]
+    features: Float32, layout: FeatureLayout, cut: Float32, spans: Sequence[tuple[int, int]]
 ) -> Float32:
     """Return features (T, D) of a body that steps from one stance to the next, where a network would push its feet.
 
     Args:
-        features: of the whole, in the layout's own units, on the skeleton of HumanML3D.
-        layout: of the features.
+        features: of the whole, in the layout's own units.
+        layout: of the features; on another skeleton than that of HumanML3D nothing is changed.
         cut: (T, D) the movements that the whole leads from one to the next, cut to each other.
         spans: the first frame of each way between stances, and the one after its last, with the cut at one of them.
             Where a foot moves beside the cut, nothing is changed.
     """
+    if not _knows_feet(layout):
+        return features
     joints, stood = (layout.decode(each).astype(np.float64) for each in (features, cut))
     stepped, contacts = joints.copy(), layout.contacts(features)
     for begin, end in spans:
@@ -80,14 +84,16 @@ def _stands(cut: Array, fps: float, begin: int, end: int) -> bool:
     return rests < MOVES_M_S and float(np.ptp(toes[..., 1])) < STEPS_M
 
 
-def with_steps(features: Float32, layout: HeadingLayout, spans: Sequence[tuple[int, int]]) -> Float32:
+def with_steps(features: Float32, layout: FeatureLayout, spans: Sequence[tuple[int, int]]) -> Float32:
     """Return features (T, D) whose feet step where they slid.
 
     Args:
-        features: of the whole, in the layout's own units, on the skeleton of HumanML3D.
-        layout: of the features.
+        features: of the whole, in the layout's own units.
+        layout: of the features; on another skeleton than that of HumanML3D nothing is changed.
         spans: the first frame of each transition, and the one after its last.
     """
+    if not _knows_feet(layout):
+        return features
     joints = layout.decode(features).astype(np.float64)
     stepped = joints.copy()
     for begin, end in spans:
@@ -96,6 +102,11 @@ def with_steps(features: Float32, layout: HeadingLayout, spans: Sequence[tuple[i
     if np.array_equal(stepped, joints):
         return features
     return _with_legs(features, layout, joints, stepped)
+
+
+def _knows_feet(layout: FeatureLayout) -> TypeGuard[HeadingLayout]:
+    """Return True of a layout whose joints can be moved, on a body whose `LEGS` are known."""
+    return isinstance(layout, HeadingLayout) and layout.skeleton.name == HUMANML3D.name
 
 
 def _with_legs(features: Float32, layout: HeadingLayout, joints: Array, stepped: Array) -> Float32:

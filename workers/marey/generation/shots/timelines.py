@@ -49,7 +49,7 @@ from marey.generation.steered import SETS_OFF_S
 from marey.generation.timed import TimedText
 from marey.generation.wish import action_of
 from marey.items.timeline import TIMELINE_HINT, no_timelines
-from marey.motion.features import FeatureLayout, HeadingLayout
+from marey.motion.features import FeatureLayout
 from marey.motion.skeleton import HUMANML3D
 from marey.quality.postures import RISE
 from marey.text.features import TextFeatures
@@ -368,8 +368,7 @@ class _Timeline:
             frames = with_whole_turns(frames, layout, turns)
         if self.open and layout.skeleton.name == HUMANML3D.name:
             frames = self._far(frames, layout)
-        if isinstance(layout, HeadingLayout) and layout.skeleton.name == HUMANML3D.name:
-            frames = with_steps(frames, layout, [(each.part.start, each.part.end) for each in self.transitions])
+        frames = with_steps(frames, layout, [(each.part.start, each.part.end) for each in self.transitions])
         timeline = zip(self.timeline, self.rows, strict=True)
         changed = tuple(replace(timed, changes=row.changes) for timed, row in timeline)
         return TimelineMotion(frames.astype(np.float32), changed)
