@@ -35,14 +35,9 @@ $(STAMP): requirements/dev.lock pyproject.toml
 demo: $(STAMP) ## Twelve prompts through the whole platform, into out/demo
 	$(BIN)/python -m marey.cli.demo
 
-# Many tests wait for servers and timeouts: lint runs beside them.
-TOGETHER := $(MAKE) --no-print-directory --jobs 2
-
-test: $(STAMP) ## Lint, and everything but slow and gpu tests: under ten minutes on two cores
-	$(TOGETHER) lint pytest
-
-test-all: $(STAMP) ## Lint, and every test
-	$(TOGETHER) lint pytest SELECT="-m ''"
+test: pytest ## Everything but slow and gpu tests: ten minutes on two cores
+test-all: SELECT := -m ''
+test-all: pytest ## Every test
 
 # One thread of numpy and torch a process: two that wait for each other take a third more of both cores.
 # In a fresh checkout a process compiles the tests for all four: each would rewrite the same thousand modules.

@@ -126,7 +126,7 @@ def test_a_class_name_has_one_meaning() -> None:
 
 
 def test_the_code_is_checked_by_make_lint() -> None:
-    """That it is clean is for `make lint` to say, which `make test` runs beside these tests."""
+    """That it is clean is for `make lint` to say, which the gate (`.ci/run`) runs before these tests."""
     assert CLAIM in words.tracked_files()
     assert "python -m tests.lint.words\n" in (words.ROOT / "Makefile").read_text().partition("\nlint:")[2]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from itertools import islice
 
 from marey.bundles import Bundle, TextSpec, find_bundle
-from marey.bundles.limits import seconds_of
+from marey.bundles.limits import stated_seconds_of
 from marey.bundles.scope import judges_meaning
 from marey.core.errors import InvalidBundle, MareyError
 from marey.items.problems import UnknownAction
@@ -113,7 +113,7 @@ class ScopeStage:
         key = scope_key(item.prompt, item.bundle, lists, in_rows=item.timeline is not None)
         if item.timeline is not None:
             return PromptScope(key, scope_of_rows(scopes).as_json())
-        return PromptScope(key, with_length(scopes[0], item.prompt, seconds_of(bundle)).as_json())
+        return PromptScope(key, with_length(scopes[0], item.prompt, stated_seconds_of(bundle)).as_json())
 
     def _bundle(self, name: str) -> Bundle:
         if name not in self.bundles:

@@ -14,7 +14,7 @@ from marey.items.constraint_frames import for_clip, frames_to_last, last_frame
 from marey.items.constraints import ROOT_PATH
 from marey.items.item import Item, Rows
 from marey.items.settings import BEST_OF, MAX_SETTING, PLATFORM_SETTINGS, REDRAWS
-from marey.items.timeline import TIMELINE_HINT, no_timelines, timeline_seconds
+from marey.items.timeline import MAX_TIMELINE_SECONDS, TIMELINE_HINT, no_timelines, timeline_seconds
 from marey.items.values import outside_range
 from marey.motion.edits.licences import terms_with
 from marey.registry import Setting, find_model
@@ -52,6 +52,22 @@ def seconds_of(bundle: Bundle) -> tuple[float, float]:
     return low, high
 
 
+def stated_seconds_of(bundle: Bundle) -> tuple[float, float]:
+    """Return the shortest and longest length in words that a generator uses, in seconds: where its model generates
+    frames around others, a longer one than its longest motion is that of a timeline.
+
+    Raises:
+        InvalidBundle: as `seconds_of`.
+    """
+    low, high = seconds_of(bundle)
+    return low, max(high, MAX_TIMELINE_SECONDS) if _keeps_frames(bundle) else high
+
+
+def _keeps_frames(bundle: Bundle) -> bool:
+    spec = find_model(bundle.manifest.model)
+    return spec is not None and spec.keeps_frames
+
+
 def _seconds(bundle: Bundle, name: str, of_model: float | None) -> float:
     """A length in the bundle's parameters, which are frames; where they do not give it, the model's."""
     value = bundle.manifest.parameters.get(name)
@@ -79,8 +95,7 @@ def check_timeline(bundle: Bundle, timeline: Rows | None) -> None:
     Raises:
         InvalidInput: its model cannot generate motion between other frames.
     """
-    spec = find_model(bundle.manifest.model)
-    if timeline is not None and not (spec and spec.keeps_frames):
+    if timeline is not None and not _keeps_frames(bundle):
         raise InvalidInput(no_timelines(bundle.manifest.model), hint=TIMELINE_HINT)
 
 
@@ -124,7 +139,8 @@ def _check_poses(bundle: Bundle, constraints: Sequence[Mapping[str, Any]]) -> No
 def length_of(bundle: Bundle, item: Item) -> float | None:
     """Return the seconds of an item's motion: its own, or those that its prompt states; None = the model decides.
 
-    A stated length out of the bundle's range is not used; `ScopeReport` warns of it.
+    A stated length beyond the bundle's longest motion is that of a timeline, which the generator makes of the prompt;
+    one out of `stated_seconds_of` is not used, and `ScopeReport` warns of it.
     """
     if item.timeline is not None:
         return timeline_seconds(item.timeline)

@@ -20,6 +20,7 @@ from marey.bundles.limits import (
     sampling_of,
     seconds_of,
     settings_of,
+    stated_seconds_of,
     variety_settings,
 )
 from marey.bundles.scope import judges_meaning
@@ -67,7 +68,7 @@ class GeneratorCapabilities:
 
     def judge(self, item: Item, report: ScopeReport) -> Scope | None:
         """Return the scope of an item's prompts, and count it; None if the bundle lists no actions."""
-        manifest, lengths = self.bundle.manifest, (self.min_seconds, self.max_seconds)
+        manifest, lengths = self.bundle.manifest, stated_seconds_of(self.bundle)
         rows = () if item.timeline is None else prompts_with_rows(item.prompt, item.timeline)
         return report.judge(item.prompt, manifest.name, manifest.actions, lengths=lengths, rows=rows)
 

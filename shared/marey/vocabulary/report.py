@@ -108,7 +108,7 @@ class ScopeReport:
             prompt: as `check_prompt` returns it.
             bundle: name of the bundle that will read it.
             lists: actions of the bundle; None = it lists none, and the prompt has no scope.
-            lengths: shortest and longest motion of the bundle, in seconds; None = not examined.
+            lengths: shortest and longest length in words that the bundle uses, in seconds; None = not examined.
             rows: of a timeline (`marey.items.timeline.prompts_with_rows`): they are judged together, as one prompt.
         """
         index, self.total = self.total, self.total + 1
@@ -217,12 +217,12 @@ def _note_of(flag: str, prompt: str) -> str:
 
 
 def with_length(scope: Scope, prompt: str, lengths: tuple[float, float]) -> Scope:
-    """Return a scope with the flag `length` if its prompt states a length out of a bundle's range.
+    """Return a scope with the flag `length` if its prompt states a length that a bundle does not use.
 
     Args:
         scope: of the prompt.
         prompt: as `check_prompt` returns it.
-        lengths: shortest and longest motion of the bundle, in seconds.
+        lengths: shortest and longest length in words that the bundle uses, in seconds.
     """
     stated = stated_length(prompt)
     exceeds = stated.within(*lengths) != stated.seconds

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from marey.bundles import Bundle, BundleWriter
-from marey.bundles.limits import check_constraints, check_seconds, seconds_of
+from marey.bundles.limits import check_constraints, check_seconds, seconds_of, stated_seconds_of
 from marey.core.errors import InvalidBundle, InvalidInput
 from marey.items.constraints import read_constraints
 from marey.items.item import Item
+from marey.registry import get_model
 from tests.support.plugins import installed, write_distribution
 
 DANCER = """\
@@ -56,6 +58,16 @@ def test_a_bundle_narrows_its_model(
     for value in (seconds[0] - 0.1, seconds[1] + 0.1):
         with pytest.raises(InvalidInput, match="the range of short"):
             check_seconds(found, value)
+
+
+def test_words_may_state_the_length_of_a_timeline_where_the_model_makes_them(
+    dancer: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = bundle(tmp_path / "short", max_frames=40)
+    assert stated_seconds_of(found) == (1.0, 2.0)
+    keeping = replace(get_model("dancer"), keeps_frames=True)
+    monkeypatch.setattr("marey.bundles.limits.find_model", lambda name: keeping if name == "dancer" else None)
+    assert stated_seconds_of(found) == (1.0, 60.0)
 
 
 @pytest.mark.parametrize("parameters", [{"min_frames": 19}, {"max_frames": 161}, {"longest_frames": 161}])

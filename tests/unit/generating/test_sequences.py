@@ -120,6 +120,35 @@ def test_one_movement_is_as_long_as_the_only_length_that_its_words_name(generato
     assert (request.frames, request.open) == (round(3 * generator.limits.fps), False)
 
 
+def test_a_length_beyond_the_longest_motion_is_that_of_a_timeline(generator: Any) -> None:
+    fps, longest = generator.limits.fps, generator.limits.max_frames / generator.limits.fps
+    seconds = round(longest) + 8
+    text = text_of(f"a person walks ahead for {seconds} seconds", generator.limits.text_width)
+    request = resolve_request(generator, Request(text, 3))
+    assert request.timeline is not None
+    assert [(row.start, row.end, row.open) for row in request.timeline] == [(0.0, seconds, False)]
+    (made,) = generate_any(generator, [request])
+    assert made is not None
+    assert len(made.features) == seconds * fps
+    assert finish(generator, request, made, generator.settings({})).manifest["prompt"] == text.prompt
+    beyond = replace(text, prompt="a person walks ahead for 61 seconds")
+    assert resolve_request(generator, Request(beyond, 3)).timeline is None
+
+
+def test_movements_have_the_lengths_of_their_words_beyond_the_longest_motion(generator: Any) -> None:
+    width, fps = generator.limits.text_width, generator.limits.fps
+    long = round(generator.limits.max_frames / fps) + 2
+    parts = (f"walks for {long} seconds", f"runs for {long - 3} seconds")
+    text = replace(text_of(", then ".join(parts), width), movements=tuple(text_of(part, width) for part in parts))
+    request = resolve_request(generator, Request(text, 3))
+    assert alone(generator, request) == [round(long * fps), round((long - 3) * fps)]
+    assert request.frames == sum(alone(generator, request))
+    shared = replace(text, prompt=f"walks, then runs, {long} seconds in total")
+    movements = tuple(text_of(part, width) for part in ("walks", "runs"))
+    request = resolve_request(generator, Request(replace(shared, movements=movements), 3))
+    assert sum(alone(generator, request)) == round(long * fps)
+
+
 def test_what_is_too_short_for_its_movements_stays_one_text(generator: Any) -> None:
     request = resolve_request(generator, Request(prompt_of(generator), 3, frames=40))
     assert (request.timeline, request.frames) == (None, 40)

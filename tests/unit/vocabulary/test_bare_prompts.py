@@ -108,6 +108,8 @@ def test_verbs_of_seeming_go_with_what_they_say(prompt: str, left: str) -> None:
         ("pulls her left arm across her chest", "", ["arm-across-stretch"]),
         ("throws up into a bucket", "", ["vomit"]),
         ("dry-heaves", "", ["vomit"]),
+        ("does a handstand against the wall", "", ["handstand"]),
+        ("she kicks up into a handstand, then waves", "waves", ["handstand"]),
         ("a man is dry heaving", "", ["vomit"]),
         ("clutches his chest in pain", "", ["hand-on-heart"]),
         ("hears a noise and turns around", "hears a noise and turns around", []),

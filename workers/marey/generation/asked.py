@@ -126,15 +126,39 @@ def generate_as_asked(
     ]
 
 
+def drawn_as_asked(generator: Generator[Any], request: Request) -> MotionFeatures | None:
+    """Return the motion of a request of any length that is drawn without a network; None if none is, or it has another
+    length.
+
+    Args:
+        generator: of the motion.
+        request: with a length.
+    """
+    wish = Wish.of(request)
+    whole = _drawn_whole(generator, request, wish) if _may_be_drawn(generator, request, wish) else None
+    if whole is None:
+        return None
+    motion = _in_posture(generator, request, wish, _as_asked(generator, request, wish, whole, None))
+    return motion if motion is not None and len(motion.features) == request.frames else None
+
+
 def _whole(generator: Generator[S], request: Request, wish: Wish) -> DrawnWhole | None:
     """Return the motion that is drawn for a request before a network is asked; None if none is.
 
     Raises:
         InvalidInput: as `Limits.check`.
     """
-    if not draws(generator, request) or not (wish.action or request.held.is_drawn):
+    if not _may_be_drawn(generator, request, wish):
         return None
     generator.limits.check(request)
+    return _drawn_whole(generator, request, wish)
+
+
+def _may_be_drawn(generator: Generator[Any], request: Request, wish: Wish) -> bool:
+    return draws(generator, request) and bool(wish.action or request.held.is_drawn)
+
+
+def _drawn_whole(generator: Generator[Any], request: Request, wish: Wish) -> DrawnWhole | None:
     if request.held.is_drawn:
         kept = None if request.open else wish.for_network(request, generator.limits).frames
         drawn = drawn_posture(generator.layout, request.held, request.text.said, request.seed, kept)

@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 
 from marey.drawing.forms import NAMED, StatedForm, is_at_pace, misfit
 from marey.drawing.gesture import Gesture
-from marey.drawing.kinds import COUNTED, DRAWINGS
+from marey.drawing.kinds import COUNTED, DRAWINGS, Counted
 from marey.generation.ball_games import dribbles_on_spot
 from marey.generation.dodging import stays
 from marey.generation.fine import FINE
 from marey.generation.fine_wish import FineWish
+from marey.generation.pose_holds import with_frames_held
 from marey.generation.stated import stated_features
 from marey.generation.striking import stands
 from marey.generation.timed import worded_seed
@@ -34,6 +35,7 @@ from marey.posing.standing import LEFT, RIGHT, StandingBody
 from marey.posing.still import standing_still
 from marey.selector.motion import SHORTEST, Motion
 from marey.selector.rules import is_shown
+from marey.vocabulary.lengths import stated_length
 from marey.vocabulary.paces import stated_pace
 
 Float32 = NDArray[np.float32]
@@ -61,6 +63,14 @@ DRAWN = 6
 """Movements that are drawn and graded at most."""
 MOST = 20
 """Times that a movement is drawn at most; a larger number is made of these (`marey.generation.repetitions`)."""
+MOST_LASTING = 80
+"""The same of one that lasts as long as the prompt says."""
+SOME = (3, 6)
+"""Times by which its pace is known: one alone is often slower."""
+STAYING = frozenset({"bow", "bend-over", "raise-arm", "reach-up", "reach-forward", "crouch", "balance"})
+"""Actions whose pose is held for as long as a prompt says that they last: "bows for four seconds"."""
+AGAIN: Mapping[str, Counted] = {action: draw for action, draw in COUNTED.items() if action not in STAYING}
+"""Those that are done again and again meanwhile: "kicks for six seconds"."""
 SHORTER = 0.85
 """Share of its own length to which a movement is cut at most, where the length is fixed: at its end the body waits. A
 body that stands has any length."""
@@ -150,10 +160,15 @@ ALONE: Mapping[str, Callable[[FineWish], bool]] = {
 
 def _shown(action: str, wish: FineWish, rng: random.Random, frames: int | None) -> tuple[Gesture, Array] | None:
     """Return the first movement that shows its action, and its joints (T, 22, 3); None if none does."""
-    for number, gesture in enumerate(_asked_for(action, wish, rng, frames)):
+    lasts = frames if frames is not None and wish.fixed and stated_length(wish.prompt).seconds is not None else None
+    for number, gesture in enumerate(_asked_for(action, wish, rng, frames, lasts)):
         if number == DRAWN:
             break
-        joints = _drawn(gesture, wish.fixed, frames, rng)
+        if lasts is not None and action in STAYING:
+            own = _drawn(gesture, wish.fixed, min(lasts, round(gesture.seconds * FPS)), rng)
+            joints = with_frames_held(own, lasts, FPS)
+        else:
+            joints = _drawn(gesture, wish.fixed, frames, rng)
         if action in WEIGHS:
             joints = with_weight(joints, random.Random(f"{gesture.seconds} weight"))  # noqa: S311
         side = wish.side if gesture.side in (LEFT, RIGHT) else ""
@@ -162,9 +177,17 @@ def _shown(action: str, wish: FineWish, rng: random.Random, frames: int | None) 
     return None
 
 
-def _asked_for(action: str, wish: FineWish, rng: random.Random, frames: int | None) -> Iterator[Gesture]:
+def _asked_for(
+    action: str, wish: FineWish, rng: random.Random, frames: int | None, lasts: int | None = None
+) -> Iterator[Gesture]:
     """Yield movements of which the prompt says nothing that is not true, and that have room: those whose form is as it
-    says first."""
+    says first.
+
+    Args:
+        action, wish, rng, frames: as in `_one`.
+        lasts: frames that the prompt has the movement last; it is done as often as there is room.
+    """
+    again = AGAIN.get(action) if lasts is not None and wish.count is None else None
     text = wish.prompt.lower()
     brief, seconds = any(wish.beside) and not wish.fixed, frames / FPS if wish.fixed and frames is not None else None
     beside = " ".join(wish.beside).lower()
@@ -173,10 +196,20 @@ def _asked_for(action: str, wish: FineWish, rng: random.Random, frames: int | No
     for number in range(MOST_TRIES):
         if number >= TRIES and any(far < NAMED for far, _ in found):
             break
-        gesture = _draw(action, rng, wish.count)
+        gesture = _draw(action, rng, wish.count) if again is None else _lasting(again, rng, (lasts or 0) / FPS)
         if _may_be(gesture, text, wish.side, frames if wish.fixed else None):
             found.append((misfit(gesture, action, asked), gesture))
     yield from (gesture for _, gesture in sorted(found, key=lambda each: each[0]))
+
+
+def _lasting(draw: Counted, rng: random.Random, seconds: float) -> Gesture:
+    """Draw a movement by chance, as often as there is room in so many seconds at its own pace."""
+    begun, found = rng.getstate(), list[float]()
+    for times in SOME:
+        found.append(draw(rng, times=times).seconds)
+        rng.setstate(begun)
+    each = (found[1] - found[0]) / (SOME[1] - SOME[0])
+    return draw(rng, times=min(max(SOME[0] + int((seconds - found[0]) / each), 1), MOST_LASTING))
 
 
 def _draw(action: str, rng: random.Random, count: int | None) -> Gesture:

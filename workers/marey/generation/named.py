@@ -21,6 +21,7 @@ from marey.drawing.errands import cower, curtsy, rowing, shelf_lift, shoe_tied
 from marey.drawing.field_throws import field_throw
 from marey.drawing.floor_ways import ground_pounded
 from marey.drawing.gesture import SIDES, Gesture
+from marey.drawing.handstands import handstand
 from marey.drawing.knee_raises import knee_raise
 from marey.drawing.knee_strikes import knee_strike
 from marey.drawing.lunges import lunges
@@ -56,6 +57,11 @@ BURPEE_S = 3.6
 """Seconds of one of several burpees."""
 LUNGE_S = 1.9
 """Seconds of one of several lunges."""
+HANDSTAND_S = 5.0
+"""Seconds of the way into a handstand and out of it."""
+MOST_HANDSTANDS = 3
+_FEW_HAND_STEPS, _HAND_STEPS_MOST = 4, 6
+"""Steps on the hands, beside other things and alone."""
 _WALKING = re.compile(r"\bwalking\b|\b(?:across|along|down) the\b")
 _REVERSE = re.compile(r"\b(?:reverse|backwards?)\b|\blung\w+ back\b")
 _SIDE_LUNGE = re.compile(r"\b(?:side|lateral|sideways)\b|\bto (?:the|his|her) (?:left|right)\b")
@@ -79,6 +85,8 @@ _OBSTACLES = {
 }
 """Words of what is stepped over; anything else is as high as a log."""
 _STEPS = frozenset({"step", "steps", "paces"})
+_LASTS = re.compile(r" for [\w -]+ sec\w*| \w+[- ]second\b")
+_WALKS_ON = re.compile(r"\bwalk\w*\b")
 _BACK = re.compile(r"\bback(?:wards?)?\b")
 _SLIPS = re.compile(r"\bslip|\bfooting\b")
 _CROUCHED = re.compile(r"\b(?:crouch|kneel|squat)\w*")
@@ -356,6 +364,17 @@ def _plank(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: f
     return plank(rng, form, stated.side, seconds=lasts, enters=enters, leaves=leaves)
 
 
+def _handstand(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    hold, words = stated_hold(wish.prompt), _LASTS.sub("", stated.words)
+    if _WALKS_ON.search(stated.words):
+        steps = stated_things(stated.words, _STEPS) or (_FEW_HAND_STEPS if any(wish.beside) else _HAND_STEPS_MOST)
+        return handstand(rng, steps=min(steps, _HAND_STEPS_MOST))
+    number = stated_number(words)
+    times = None if number is None else min(number, MOST_HANDSTANDS)
+    room = None if seconds is None or times else max(seconds - HANDSTAND_S, 0.6)
+    return handstand(rng, stated.side, times=times, hold=hold or room)
+
+
 NAMED: Mapping[str, Callable[[StatedBearing, FineWish, random.Random, float | None], Gesture]] = {
     "burpee": _burpees,
     "lunges": _lunges,
@@ -397,6 +416,7 @@ NAMED: Mapping[str, Callable[[StatedBearing, FineWish, random.Random, float | No
     "door-pulled": _door,
     "door-pushed": _door,
     "plank": _plank,
+    "handstand": _handstand,
     "bat-swing": _bat_swing,
 }
 """Movements by the bearing that names them."""

@@ -10,6 +10,7 @@ from marey.motion.filters import smooth_seconds
 from marey.posing.standing import poses_at
 
 Float32 = NDArray[np.float32]
+Array = NDArray[np.floating]
 
 HOLDING = frozenset(
     {"squat", "bow", "bend-over", "raise-arm", "reach-up", "reach-forward", "pick-up", "crouch", "balance"}
@@ -30,12 +31,32 @@ def with_held_pose(features: Float32, layout: FeatureLayout, seconds: float) -> 
         seconds: for which the pose is held.
     """
     joints = layout.decode(features).astype(np.float64)
-    away = np.linalg.norm(joints - joints[:1], axis=-1).mean(axis=1)
-    at = int(away.argmax())
-    alike = np.linalg.norm(joints - joints[at], axis=-1).mean(axis=1) < NEAR * away[at]
+    at, away = _farthest(joints)
+    alike = np.linalg.norm(joints - joints[at], axis=-1).mean(axis=1) < NEAR * away
     more = round(seconds * layout.fps) - int(alike.sum())
-    if more <= 0:
-        return features
+    return encode_all(layout, _held(joints, at, more, layout.fps)) if more > 0 else features
+
+
+def with_frames_held(joints: Array, frames: int, fps: float) -> Array:
+    """Return joints (frames, 22, 3) that stay in their farthest pose until there are so many; as they are if there are
+    already.
+
+    Args:
+        joints: (T, 22, 3) metres, Y up.
+        frames: that there are to be.
+        fps: of the joints.
+    """
+    return _held(joints, _farthest(joints)[0], frames - len(joints), fps) if frames > len(joints) else joints
+
+
+def _farthest(joints: Array) -> tuple[int, float]:
+    """Return the frame whose pose differs most from the first, and by how many metres it does."""
+    away = np.linalg.norm(joints - joints[:1], axis=-1).mean(axis=1)
+    return int(away.argmax()), float(away.max())
+
+
+def _held(joints: Array, at: int, more: int, fps: float) -> Array:
+    """Return joints that stay in the pose of a frame for so many frames more."""
     index = np.concatenate([np.arange(at), np.full(more, at), np.arange(at, len(joints))]).astype(float)
-    index[1:-1] = smooth_seconds(index, EASES_S, layout.fps)[1:-1]
-    return encode_all(layout, poses_at(joints, index))
+    index[1:-1] = smooth_seconds(index, EASES_S, fps)[1:-1]
+    return poses_at(joints, index)

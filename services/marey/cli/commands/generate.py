@@ -162,7 +162,9 @@ def _report(line: dict[str, Any], clip: MotionClip, *, as_json: bool) -> None:
 def _report_rewrite(clip: MotionClip) -> None:
     about = clip.manifest
     if about["rewritten"] != about["prompt"]:
-        console.say(f"{about['prompt']!r} was read as {about['rewritten']!r}.")
+        drawn = ", ".join(each["name"] for each in about.get("bearing") or ())
+        beside = f", with what is drawn on it: {drawn}" if drawn else ""
+        console.say(f"{about['prompt']!r} was read as {about['rewritten']!r}{beside}.")
     elif "not_rewritten" in about:
         console.say(f"{about['prompt']!r} was read as it is: {about['not_rewritten']}.")
 
@@ -278,7 +280,7 @@ def _refuse(reader: rows.PromptReader, items: Iterable[Item], bundle: Bundle, st
 
 def _examine(reader: rows.PromptReader, items: list[Item], studio: OneShot, policy: ScopePolicy) -> None:
     """Refuse prompts that the bundle does not know, or warn of them, by words and meaning."""
-    from marey.bundles.limits import seconds_of
+    from marey.bundles.limits import stated_seconds_of
     from marey.vocabulary.report import ScopeReport
 
     manifest = studio.bundle.manifest
@@ -286,7 +288,7 @@ def _examine(reader: rows.PromptReader, items: list[Item], studio: OneShot, poli
         return
     if policy == "refuse":
         _refuse(reader, items, studio.bundle, studio)
-    report, lengths = ScopeReport(), seconds_of(studio.bundle)
+    report, lengths = ScopeReport(), stated_seconds_of(studio.bundle)
     if manifest.actions is not None:
         prompts = {prompt for item in items for _, prompt in prompts_with_rows(item.prompt, item.timeline)}
         scopes = {prompt: studio.match_scope(prompt, manifest.actions) for prompt in prompts}

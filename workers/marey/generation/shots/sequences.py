@@ -24,7 +24,7 @@ from marey.generation.shots.one_movement import joined_movements
 from marey.generation.shots.way_lengths import with_least_ways, with_room_back
 from marey.generation.timed import TimedText, part_seed
 from marey.generation.wish import action_of
-from marey.items.timeline import MIN_ROW_SECONDS
+from marey.items.timeline import MAX_TIMELINE_SECONDS, MIN_ROW_SECONDS
 from marey.text.features import TextFeatures
 from marey.vocabulary.courses import RUNS
 from marey.vocabulary.entries import load_vocabulary
@@ -64,7 +64,8 @@ _RESTS = frozenset({STANDING, "lie", "lie-down", "die"})
 
 
 def as_timeline(generator: Generator[Any], request: Request) -> Request:
-    """Return the request of a sequence as that of a timeline with a row for each movement; any other as it is.
+    """Return the request of a sequence as that of a timeline with a row for each movement, and that of one movement
+    that lasts longer by its words than the model's longest motion as that of one row; any other as it is.
 
     Each movement has the length that its words state, or the model gives it alone. Where the length of the whole is
     asked for, all are longer or shorter by the same factor; where that leaves one of them less than a second, the
@@ -84,12 +85,15 @@ def as_timeline(generator: Generator[Any], request: Request) -> Request:
     if not movements and alone and request.frames is None:
         only = _only_frames(generator.limits, request.text.said) if action_of(request.text) else None
         request = replace(request, frames=only)
-    if not (movements and alone and generator.limits.keeps):
+    if not (alone and generator.limits.keeps):
         return request
     generator.limits.check(request)
+    request = replace(request, frames=request.frames or _long_frames(generator.limits, request.text.prompt))
     fps = generator.limits.fps
     if len(movements) == 1:
-        return replace(request, text=replace(movements[0], prompt=request.text.prompt))
+        request, movements = replace(request, text=replace(movements[0], prompt=request.text.prompt)), ()
+    if not movements:
+        return _as_one_row(generator.limits, request)
     if _is_sum_of_parts(request, movements, fps):
         request = replace(request, frames=None)
     stated = [_stated_frames(generator.limits, request, movement) for movement in movements]
@@ -116,6 +120,23 @@ def as_timeline(generator: Generator[Any], request: Request) -> Request:
     return replace(request, timeline=rows)
 
 
+def _long_frames(limits: Limits, prompt: str) -> int | None:
+    """Return the frames of a length that a prompt states, if it is longer than the longest motion of the model and a
+    timeline may have it."""
+    seconds = stated_length(prompt).seconds
+    frames = 0 if seconds is None or seconds > MAX_TIMELINE_SECONDS else round(seconds * limits.fps)
+    return frames if frames > limits.max_frames else None
+
+
+def _as_one_row(limits: Limits, request: Request) -> Request:
+    """Return the request of one movement that is longer than the longest motion of the model as that of a timeline of
+    one row; any other as it is."""
+    if request.frames is None or request.frames <= limits.max_frames:
+        return request
+    text = replace(request.text, movements=(request.text,))
+    return replace(request, text=text, timeline=(TimedText(0.0, request.frames / limits.fps, request.text),))
+
+
 def _only_frames(limits: Limits, said: str) -> int | None:
     """Return the frames of a prompt of one movement that names one length; None = it names none within the range of the
     bundle."""
@@ -134,12 +155,14 @@ def _is_sum_of_parts(request: Request, movements: Sequence[TextFeatures], fps: f
 
 def _stated_frames(limits: Limits, request: Request, movement: TextFeatures) -> int | None:
     """Return the frames of a movement that its words state, or its reader; None = they do not, or the prompt has a
-    length out of the range of the bundle."""
+    length that no timeline has."""
     if movement.seconds is not None:
         return limits.within(round(movement.seconds * limits.fps))
     whole, own = stated_length(request.text.prompt), stated_length(movement.prompt).seconds
-    used = whole.is_partial or whole.within(limits.min_frames / limits.fps, limits.max_frames / limits.fps)
-    return limits.within(round(own * limits.fps)) if used and own is not None else None
+    used = whole.is_partial or whole.within(limits.min_frames / limits.fps, MAX_TIMELINE_SECONDS)
+    if not used or own is None:
+        return None
+    return max(round(min(own, MAX_TIMELINE_SECONDS) * limits.fps), limits.min_frames)
 
 
 def _drawn_frames(generator: Generator[Any], request: Request, movement: TextFeatures, number: int) -> int:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from marey.core.errors import InvalidInput
 from marey.drawing.holds import BACK, CROUCH, FLOOR, FOURS, FRONT, KNEE, KNEES
-from marey.generation.asked import changes_of, generate_as_asked
+from marey.generation.asked import changes_of, drawn_as_asked, generate_as_asked
 from marey.generation.distances import with_distance
 from marey.generation.passes import PassControl
 from marey.generation.port import GenerationControl, Generator, Limits, NoControl, Request, S
@@ -384,7 +384,7 @@ class _Windows:
         control: GenerationControl,
         timelines: Sequence[_Timeline],
     ) -> None:
-        self._control = control
+        self._control, self._generator = control, generator
         self._generate: Callable[..., Sequence[object]]
         self._timelines = timelines
         self._total = sum(timeline.windows for timeline in timelines)
@@ -403,6 +403,9 @@ class _Windows:
 
     def make(self, strands: Sequence[RowStrand] | Sequence[Transition]) -> None:
         """Generate all windows of parts that do not depend on each other."""
+        for row in strands:
+            if isinstance(row, RowStrand) and len(row.lengths) > 1 and not row.fate.dropped:
+                self._draw(row)
         while left := [each for each in strands if not each.fate.dropped and len(each.windows) < len(each.lengths)]:
             watched = PassControl(self._control, self._owners(left), self._done, self._total)
             new = [each for each in left if isinstance(each, RowStrand) and not each.windows]
@@ -415,6 +418,17 @@ class _Windows:
                 else:
                     strand.add(window)
             self._done += len(made)
+
+    def _draw(self, row: RowStrand) -> None:
+        """Draw the whole of a row that is longer than the model's longest motion, if rules draw its movement."""
+        request = replace(row.request(), frames=row.part.frames)
+        motion = drawn_as_asked(self._generator, request)
+        if motion is not None:
+            self._total -= len(row.lengths) - 1
+            row.lengths = [row.part.frames]
+            row.changes = changes_of(motion)
+            row.add(Window(motion.features, 0, len(motion.features)))
+            self._done += 1
 
     def _owners(self, strands: Sequence[Strand]) -> list[int]:
         place = {id(timeline.fate): number for number, timeline in enumerate(self._timelines)}
