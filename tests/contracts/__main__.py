@@ -12,6 +12,7 @@ from marey.db import create_engine, upgrade
 from marey.embedded import start_postgres
 from marey.embedded.postgres import _postgres
 from marey.registry import model_names
+from tests.contracts.figures import figures
 from tests.contracts.motions import motion, processor
 from tests.contracts.story import events
 from tests.contracts.surfaces import SURFACES, database, of_model
@@ -42,10 +43,22 @@ def main() -> None:
         engine.dispose()
     for name, value in found.items():
         _write(RECORDED / f"{name}.json", value)
+    write_figures()
     for model in model_names():
         surfaces = of_model(model)
         made = {name: motion(name) for name in surfaces["bundle_tensors"]}
         _write(file_of(model), surfaces | {"motions": made, "processor": processor()})
+
+
+def write_figures() -> None:
+    """Write those of motions, one a line."""
+    lines = [
+        f" {json.dumps(part)}: {{\n"
+        + ",\n".join(f"  {json.dumps(name)}: {json.dumps(value)}" for name, value in sorted(of.items()))
+        + "\n }"
+        for part, of in sorted(figures().items())
+    ]
+    (RECORDED / "motion.json").write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
 
 
 def _write(path: Path, value: Any) -> None:
