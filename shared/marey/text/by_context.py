@@ -34,6 +34,14 @@ _DISTANCE = re.compile(
 )
 """A gaze straight ahead behind another movement: the body stands."""
 
+_DUCKS = re.compile(
+    r"(?P<blow>\b(?:punch(?:es|ing)?|jabs?|hooks?|uppercuts?|kicks?|strikes?|elbows?|blocks?|cross(?:es)?|combo)"
+    r"\b[^.;]*?(?:,? and then|,? and|,? then|,)(?: (?:he|she|they))?(?: (?:quickly|then))*) duck(?P<s>s|ing)?"
+    r"(?! (?:down|behind|into|for|low|and cover|his|her|to|walk|out)\b)(?=\W*$|[,.;]| (?:and|then|twice|\w+ times)\b)",
+    re.IGNORECASE,
+)
+"""A duck behind a blow, which evades another one."""
+
 
 def with_words_by_context(prompt: str) -> str:
     """Return a prompt in which such verbs say themselves what they mean."""
@@ -47,6 +55,7 @@ def with_words_by_context(prompt: str) -> str:
         text = _DRAWS.sub(_draws_bow, text)
     if not _HIGH_PLACE.search(text):
         text = _WALKS_UP.sub(r"\g<walks> forward", text)
+    text = _DUCKS.sub(lambda it: f"{it['blow']} {in_form_of(it['s'] or '', 'dodge')} under it", text)
     return _DISTANCE.sub(r"\g<joint>stands still", text)
 
 

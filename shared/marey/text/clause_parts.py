@@ -20,6 +20,8 @@ MOST_PARTS = 8
 """Parts of a clause that are told apart at most."""
 ALONE = frozenset({"cartwheel", "flip", "roll", "jump-turn", "push-ups", "sit-ups", "climb-onto", "crawl"})
 """Actions of the whole body, beside which no other is done: behind them, "and" separates as well."""
+BLOWS = frozenset({"punch", "kick", "block", "dodge", "slash", "stab", "shoot", "throw"})
+"""Deeds of a fight, of which each is over before another one begins: "a boxer jabs and ducks"."""
 BESIDE = frozenset({"wave", "clap", "cheer", "laugh", "nod", "talk", "signal", "raise-arm", "shiver", "drink"})
 """Actions that may be done beside others: "walks and waves"."""
 JUMPS = frozenset({"jump", "jump-forward", "hop", "leap"})
@@ -30,8 +32,8 @@ CHANGES = frozenset({"slow", "speed", "accelerate", "step"})
 """Verbs of who goes on at another pace or place: "slows to a walk", "steps back"."""
 IN_TURN = frozenset({"turn", "sidestep", "hop", "dodge"})
 """Actions that are done to one side and then to the other: two of them are no single one."""
-BLADES = frozenset({"slash"})
-"""Blows whose ways through the air tell one from the next: "a slash to the right, then one overhead"."""
+BY_WAYS = frozenset({"slash", "block", "kick"})
+"""Deeds whose ways through the air tell one from the next: "a slash to the right, then one overhead"."""
 _BLADE_WAYS = re.compile(
     r"\b(?:(?P<across>left to right|right to left|horizontal\w*|sideways|side to side)"
     r"|(?P<down>overhead|downwards?|down|vertical\w*|from above)"
@@ -87,7 +89,7 @@ def only_named(text: str) -> str | None:
 
 def is_on_other_side(before: str, after: str, action: str) -> bool:
     """Return True if an action is done again, on the other side: "turns left, | turns right"."""
-    if action in BLADES:
+    if action in BY_WAYS:
         ways = [_ways_of(text) for text in (before, after)]
         return all(ways) and not ways[0] & ways[1]
     sides = [{side.lower() for side in _SIDE.findall(text)} for text in (before, after)]
@@ -115,7 +117,8 @@ def _parts(text: str, listed: bool) -> Iterator[tuple[str, str]]:
             continue
         if action in SERIES and "then" not in sign[0].lower():
             continue
-        if sign["and"] and not (listed or (action in ALONE and len(right.split()) > 1)):
+        in_turn = (action in ALONE and len(right.split()) > 1) or {action, after} <= BLOWS
+        if sign["and"] and not (listed or in_turn):
             continue
         if sign["and"] and action not in ALONE and (after in BESIDE or action in JUMPS or _GOES_ON.match(right)):
             continue

@@ -95,6 +95,18 @@ _STANDS_UP = re.compile(
     re.IGNORECASE | re.VERBOSE,
 )
 """A body that sits, kneels or lies, and then "stands"."""
+_HEIGHT = r"(?:high|low|middle|mid|overhead)"
+_AT_HEIGHTS = re.compile(
+    rf"""(?:^|(?<=[,;.:]\ )|(?<=\band\ )|(?<=\bthen\ ))
+    (?P<who>(?:(?:a|an|the)\ (?:[\w-]+\ ){{1,2}}?(?=\w+s\ )|he\ |she\ )?)
+    (?P<verb>blocks?|parr(?:y|ies)|kicks?|slash(?:es)?|deflects?|guards?)\ (?P<first>{_HEIGHT})
+    (?:,?\ and\ then\ |,?\ then\ |,?\ and\ |,\ |\ /\ )(?:(?P=verb)\ )?(?P<second>{_HEIGHT})
+    (?=\W*$|[,;.]|\ (?:and|then)\b)
+    |(?:^|(?<=[,;.:]\ ))(?P<high>{_HEIGHT})\ (?P<noun>block|parry|kick|slash|guard)
+    (?:,?\ and\ then\ |,?\ then\ |,?\ and\ |,\ )(?P<low>{_HEIGHT})\ (?P=noun)(?=\W*$|[,;.])""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""A deed at one height and then at another: "block high, block low", "blocks high and low"."""
 _PLURAL = re.compile(r"(?<=[cs]h)es$|(?<=[sx])es$|s$")
 _RESTS = re.compile(
     r"(?:stand|stop|halt|rest|wait|pause)s?(?: (?:still|there|up|straight|upright|again))*\W*$", re.IGNORECASE
@@ -125,7 +137,17 @@ def with_elided(prompt: str) -> str:
     "stands still, then walks" of "walk start". Any other prompt is returned as it is."""
     prompt = _STANDS_UP.sub(r"\g<0> up", prompt)
     prompt = _COUNTED_AND_MORE.sub(_counted_again, _PLACES.sub(_pointed_again, prompt))
+    prompt = _AT_HEIGHTS.sub(_at_each_height, prompt)
     return _OTHER_SIDE.sub(_said_again, _STOPS.sub(_stopping, _STARTS.sub(_starting, prompt)))
+
+
+def _at_each_height(found: re.Match[str]) -> str:
+    """Return what is done at one height, and again with its verb at the other."""
+    first, second = found["first"] or found["high"], found["second"] or found["low"]
+    verb = found["verb"] or third_person(found["noun"].lower())
+    if first.lower() == second.lower():
+        return found[0]
+    return f"{found['who'] or ''}{verb} {first}, then {verb} {second}"
 
 
 def _counted_again(found: re.Match[str]) -> str:

@@ -37,7 +37,7 @@ _KNOCKBACK = re.compile(
     rf"|(?:knock(?:ed)? ?(?:back|down)|death|hit|react\w*|blown) (?:by )?{_BLAST})\W*$",
     re.IGNORECASE,
 )
-THROWN_BACK = "falls backward, thrown by an explosion"
+THROWN_BACK = "falls backward from an explosion"
 """Words of a body that a blast throws onto its back."""
 _OBJECT = r"(?:(?:a|an|the|some|his|her|their|its|that)\ )?(?:[\w-]+\ ){0,2}?"
 _UNDERFOOT = r"""(?:ice|icy\ \w+|black\ ice|banana(?:\ (?:peel|skin))?s?|peels?|floor|puddles?|water|oil|soap|mud|snow
@@ -85,8 +85,10 @@ _TO_THE_FLOOR = r"""(?:(?:right|clean|flat|hard)\ )?(?:down|over|flat|flying
 _FAR = r"(?:\ (?P<far>backwards?|forwards?|sideways|to\ the\ (?:left|right|side)))"
 _ENDS = r"(?=\W*$|[,.;]|\ (?:and|then|but|before)\b)"
 _BY = rf"(?:\ (?:by|from|in|with)\ (?:(?!(?:and|then|but|before)\b)[\w'-]+\ ?)+?{_ENDS})"
+_ELIDED = r"(?:(?<=^)|(?<=[,;.]\ )|(?<=\bthen\ )|(?<=\band\ ))(?!\w+ed\ (?:to|on|over)\ the\ (?:wall|door)\b)"
+"""Place of a verb that is left out, as in notes: "knocked down, gets up"."""
 _DOWNED = re.compile(
-    rf"""\b(?:is|are|was|were|gets?|getting|got|being|be)\ (?:(?:\w+ly|just|then)\ )?
+    rf"""(?:\b(?:is|are|was|were|gets?|getting|got|being|be)\ |{_ELIDED})(?:(?:\w+ly|just|then)\ )?
     (?:(?:knocked|pushed|shoved|kicked|punched|struck|blown|bowled|taken|tackled|thrown|flung|hurled|slammed|swept
     |pulled|dragged|brought){_FAR}?\ {_TO_THE_FLOOR}
     |(?:thrown|flung|hurled|blown|blasted)(?P<away>\ (?:backwards?|forwards?))
@@ -104,6 +106,17 @@ _DOWNS = re.compile(
     re.IGNORECASE | re.VERBOSE,
 )
 """The same said of what brings it down: "an explosion knocks him off his feet"."""
+_RISES_AGAIN = re.compile(
+    r"""(?P<falls>\b(?:falls?|falling|collapses?)\b(?:(?!\b(?:and|then|but|before|while)\b)[^.;,])*)
+    (?:,?\ (?:(?:and|but)\ )?then\ |,?\ (?:and|but)\ |[,;.]\ )(?:(?:he|she|they)\ )?(?P<how>(?:(?:then|\w+ly)\ )*)
+    (?:(?:back\ )?(?:get|climb|scramble|stagger|struggle|spring|jump|rise|come|stumble|leap|stand|bounce)s?
+    \ (?:right\ |straight\ )?(?:back\ )?(?:up|(?:(?:on)?to|on)\ (?:his|her|their|its)\ feet|again)
+    |rises?(?:\ (?:up|again|to\ (?:his|her|their|its)\ feet))*)
+    (?=\W*$|[,.;]|\ (?:and|then|again|slowly|quickly)\b)""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""A fall, and a rise after it by any words: "falls backward, slowly climbs back to his feet"."""
+_KNOWN_RISE = re.compile(r"\bgets? (?:back )?up$", re.IGNORECASE)
 _DENIED = re.compile(r"\b(?:almost|nearly|without|not|never|avoids?)\ (?:\w+\ )?$", re.IGNORECASE | re.VERBOSE)
 _HOW = {"slip": "on the back with slipping feet", "trip": "on the face with tripping feet"}
 """The way in which it falls: a verb of its own would be read as another movement."""
@@ -123,7 +136,15 @@ def with_falls(prompt: str) -> str:
     prompt = _DOWNS.sub(_brought_down, _DOWNED.sub(_knocked_down, prompt))
     text = _SLIPS.sub(lambda found: _falls(found, "slip"), prompt)
     text = _LOSES.sub(lambda found: _falls(found, "slip"), text)
-    return _TRIPS.sub(lambda found: _falls(found, "trip"), text)
+    text = _TRIPS.sub(lambda found: _falls(found, "trip"), text)
+    return _RISES_AGAIN.sub(_gets_up, text)
+
+
+def _gets_up(found: re.Match[str]) -> str:
+    """Return a fall, and behind it a rise in words that readers know; as it is where it is told so."""
+    if _KNOWN_RISE.search(found[0]):
+        return found[0]
+    return f"{found['falls']}, then {found['how']}gets up"
 
 
 def _falls(found: re.Match[str], verb: str) -> str:

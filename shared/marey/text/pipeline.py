@@ -37,6 +37,7 @@ from marey.text.labellers import OneAtATime
 from marey.text.left_out import may_leave_out, parts_left_out
 from marey.text.loading import load_encoder, load_labeller, load_rewriter
 from marey.text.misleading_words import without_misleading
+from marey.text.notes import with_notes_told
 from marey.text.order_reader import FILE as ORDER_FILE
 from marey.text.parsed import ParsedPrompt, warnings_of, without_punctuation
 from marey.text.plain_action import only_action, with_subject
@@ -68,7 +69,9 @@ def _in_known_words(prompt: str) -> str:
     that mislead them, and with plain words of ways that wind and of gaits in place."""
     said = with_known_verbs(
         with_plain_phrases(
-            with_plain_stunts(with_posture_first(with_words_by_context(without_asides(as_words(prompt)))))
+            with_plain_stunts(
+                with_posture_first(with_words_by_context(with_notes_told(without_asides(as_words(prompt)))))
+            )
         )
     )
     ordered = with_hand_again(with_elided(in_time_order(in_usual_order(said))))

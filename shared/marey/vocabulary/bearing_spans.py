@@ -16,7 +16,7 @@ from marey.vocabulary.bearing_patterns import (
     unless_beside,
     walking_forms,
 )
-from marey.vocabulary.bearings import FEET, Side, StatedBearing
+from marey.vocabulary.bearings import FEET, OVERHEAD, Side, StatedBearing
 from marey.vocabulary.counts import stated_strokes, strokes_before, strokes_behind
 from marey.vocabulary.held_poses import held_words
 from marey.vocabulary.hurt_legs import hurt_leg
@@ -64,6 +64,20 @@ _WITH_BOTH = re.compile(
     r"(?! (?:up|raised|out|on|in|over|behind)\b)"
 )
 """Words of both hands, behind those of work that both do."""
+_OVERHEAD = re.compile(
+    r",? (?:overhead|(?:up )?(?:above|over) (?:(?:his|her|their|the) )?head|up above(?: (?:him|her|them))?"
+    r"|(?:in|into|on|at|to) (?:the|a) (?:\w+ )?(?:ceiling|rafters))(?![\w'])"
+)
+"""Words of the place over the head where work is done, behind its own."""
+_BY_TURNS = re.compile(
+    r"(?:,|:| -)? ?\(?(?:and |while )?(?:(?:with|on|using|by) )?(?:(?:his|her|their|the) )?"
+    r"(?:(?:alternat|switch|swapp|chang)\w+(?: (?:his|her|their|the))?(?: (?:legs?|sides?|feet|foot|arms?|hands?|lead)"
+    r"| each (?:time|rep))*|(?:both|each|either) (?:legs?|sides?|feet|foot)(?: in turn)?|legs? by turns"
+    r"|one leg at a time|one (?:leg|side) (?:after|then) the other|(?:the )?(?:left|right)(?: (?:leg|foot|side))?"
+    r"(?:,|/| and| then)+ ?(?:the )?(?:left|right)(?: (?:leg|foot|side))?"
+    r"|side to side)\)?(?![\w'])"
+)
+"""Words of sides by turns, behind those of a movement."""
 _OVER_AND_OVER = re.compile(
     r" (?:(?:from )?side to side|back and forth|up and down|to and fro|left and right|over and over(?: again)?)\b"
 )
@@ -244,7 +258,7 @@ def _with_joints(text: str, found: BearingSpan, *, only: bool) -> Iterator[Beari
 def _counted(text: str, found: BearingSpan) -> BearingSpan:
     """Return words with the number of strokes that they or those beside them name, which are left out with them."""
     bearing = found.stated.bearing
-    if not (bearing.gesture or bearing.work or bearing.gait == "stomp") or bearing.moves or found.instead:
+    if not (bearing.gesture or bearing.work or bearing.gait == "stomp") or found.instead:
         return found
     number = stated_strokes(text[found.start : found.end])
     if number is not None:
@@ -280,6 +294,11 @@ def _words_of(text: str, name: str, kind: str, match: re.Match[str]) -> Iterator
         by_hand = stated.bearing.gesture or stated.bearing.work or len(stated.bearing.arms) == 1
         hand = _WITH_HAND.match(text, match.end()) if not stated.side and by_hand else None
         over = _OVER_AND_OVER.match(text, match.end()) if stated.bearing.work else None
+        over = _OVERHEAD.match(text, match.end()) or over if stated.bearing.work else over
+        if over is not None and OVERHEAD.search(over[0]):
+            stated = replace(stated, words=text[match.start() : over.end()])
+        if stated.bearing.moves and (turns := _BY_TURNS.match(text, match.end())):
+            over, stated = turns, replace(stated, words=text[match.start() : turns.end()])
         if over is None and stated.bearing.work and len(stated.bearing.arms) > 1:
             over = _WITH_BOTH.match(text, match.end())
         if hand is None:

@@ -81,6 +81,12 @@ _BRINGS = re.compile(
 _BOWS = re.compile(r"\b(?:lower|bow|hang|drop|bend)s?\b")
 """The same of the head."""
 _ENDS = re.compile(r"\b(?:hang\w*|hung) up\b|\bends? the\b|\b(?:puts?|sets?|lowers?|putting|setting|lowering)\b")
+OVERHEAD = re.compile(
+    r"\boverhead\b(?! (?:lines?|lights?|projector|bin|locker))|\b(?:above|over) (?:(?:his|her|their|the|its) )?head\b"
+    r"|\bup above\b"
+    r"|\b(?:on|in|into|at|to|against|along) (?:(?:the|a|an) )?(?:\w+ )?(?:ceiling|rafters)\b|\bthe ceiling\b"
+)
+"""Words of work over the head."""
 LEAST_STROKES_HZ = 1.1
 """Strokes a second from which on a number counts these, and not how often the whole gesture is made."""
 RETURNS_S, ALIKE = 0.45, 0.06
@@ -252,6 +258,11 @@ class StatedBearing:
     def is_done(self) -> bool:
         """True if it is begun and ended in its movement: a gesture, or work of a number of strokes."""
         return self.bearing.gesture or (self.bearing.work and self.times is not None and self.bearing.strokes_s(1) > 0)
+
+    @property
+    def is_overhead(self) -> bool:
+        """True if its words say of work that it is done over the head."""
+        return self.bearing.work and OVERHEAD.search(self.words) is not None
 
     @property
     def first(self) -> str:

@@ -54,6 +54,11 @@ _CLAUSE = re.compile(
     rf"(?:,? (?:for |exactly |just )?(?:once|twice|thrice|[×x] ?\d+|\d+|{'|'.join(_NUMBERS)})(?: ?[\w×]+)?\b)?"
 )
 """Words behind what is done that may name a number of strokes: those of its clause, and a number behind a comma."""
+_NOTED = re.compile(
+    rf" ?(?:[:(\[–—-]|, ) ?(?:(?:x|×) ?(?P<by>\d{{1,2}})|(?:reps|times|count):? {_NUMBER}"
+    rf"|{_NUMBER.replace('<number>', '<times>')} ?(?:x|×|times|reps|repetitions))\b[)\]]?"
+)
+"""A number noted behind what is done: "burpees (x3)", "burpees: 3 reps"."""
 _GIVEN = re.compile(
     rf"(?:^|\b(?:gives?|makes?|does|do|giving|making|doing|delivers?|lands?|performs?|performing|completes?) )"
     rf"(?:(?:[a-z]+|\d+) sets? of )?{_NUMBER} (?:(?!times )[a-z]+ )?$"
@@ -165,6 +170,10 @@ def strokes_behind(text: str, at: int) -> StatedStrokes | None:
         text: in lower case.
         at: where the words of what is done end, in characters.
     """
+    noted = _NOTED.match(text, at)
+    number = 0 if noted is None else _value(noted["by"] or noted["number"] or noted["times"])
+    if noted is not None and 0 < number <= MOST:
+        return StatedStrokes(number, noted.end())
     clause = _CLAUSE.match(text, at)
     end = at if clause is None else clause.end()
     for each in _strokes_in(text[at:end]):

@@ -32,9 +32,9 @@ _AT = (
 """Objects that a head faces which turns up or down: "up at the tower"."""
 _BEHIND = r"behind(?: (?:him|her|them)(?:sel(?:f|ves))?)?(?! (?:the|an?|my|your|his|their)\b)"
 _WHERE = {
-    "behind_left": rf"over (?:his|her|their|its|the|your|my) left shoulder"
+    "behind_left": r"over (?:(?:his|her|their|its|the|your|my) )?left shoulder"
     rf"|(?:left )?{_BEHIND} (?:over|on|to) (?:his|her|their|its|the) left(?: shoulder| side)?",
-    "behind_right": rf"over (?:his|her|their|its|the|your|my) right shoulder"
+    "behind_right": r"over (?:(?:his|her|their|its|the|your|my) )?right shoulder"
     rf"|(?:right )?{_BEHIND} (?:over|on|to) (?:his|her|their|its|the) right(?: shoulder| side)?",
     "left": r"left|leftwards?|(?:(?:in|at|into) )?(?:the|his|her) left mirror",
     "right": r"(?:(?:in|at|into) )?(?:the|his|her) (?:right|rear-?view|rear view|driving) mirror"
@@ -43,7 +43,7 @@ _WHERE = {
     r"(?:sky|ceiling|stars|heavens|clouds|moon|sun)",
     "down": rf"down(?! the ){_AT}|downwards?|at (?:(?:the|his|her|their|its) )?(?:floor|ground|feet|shoes|watch)",
     "around": r"around|about(?! to\b)|both ways|(?:from )?side to side|left and right|right and left",
-    "behind": rf"{_BEHIND}|over (?:his|her|their|its|the|one|a|your|my) shoulder",
+    "behind": rf"{_BEHIND}|over (?:(?:his|her|their|its|the|one|a|your|my) )?shoulder",
 }
 _SIDE = r"(?:(?:back |quickly |slowly |briefly )?(?:to (?:the|his|her|their|its) )?)"
 _ANY = "|".join(f"(?P<{name}>{words})" for name, words in _WHERE.items())

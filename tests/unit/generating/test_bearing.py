@@ -130,6 +130,19 @@ def test_work_ends_with_its_movement(generator: Any) -> None:
     assert [[each.name for each in span.stated] for span in spans] == [["old", "hammering"], ["old"]]
 
 
+def test_a_limp_is_on_the_leg_that_another_movement_hurts(generator: Any) -> None:
+    width = generator.limits.text_width
+    rows = (
+        replace(text_of("gets hit", width), rewritten="a person stands upright, breathing calmly, until hit"),
+        replace(text_of("limps on", width), rewritten="a person walks forward"),
+    )
+    for side in ("left", "right"):
+        whole = replace(text_of(f"takes a bullet to the {side} leg and limps on", width), movements=rows)
+        request = resolve_request(generator, Request(whole, 3))
+        limp = borne_spans(request, FPS, round(20 * FPS))[-1].stated[0]
+        assert (limp.name, limp.side) == ("limp", side)
+
+
 def test_gestures_are_in_the_order_of_the_prompt() -> None:
     for prompt in ("yawns and scratches his head", "scratches his head and yawns"):
         names = [each.name for each in fitting(stated_bearings(prompt), "idle")]

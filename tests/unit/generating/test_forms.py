@@ -48,6 +48,9 @@ def test_the_arms_that_are_named_act(text: str, side: str, acts: str) -> None:
     ("action", "text", "kind"),
     [
         ("kick", "a roundhouse kick to the head", "kick-round"),
+        ("throw", "throws grenade underarm", "throw-under"),
+        ("shoot", "fires twice", "shoot-many"),
+        ("sit", "sits on a bench, leans forward with elbows on knees", "sit-lean"),
         ("balance", "holds the tree pose", "balance-tree"),
         ("drink", "bites into an apple", "drink-eat"),
         ("stab", "thrusts the spear", "stab-spear"),

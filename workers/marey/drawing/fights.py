@@ -89,15 +89,19 @@ _BLOCKS: dict[str, tuple[dict[str, Point], Point]] = {
     "block-cross": ({"acts": (-0.05, 0.05, 0.37), "other": (-0.06, -0.02, 0.26)}, (0.7, -0.9, 0.0)),
 }
 """Where the hand that blocks and the other one go, and where the elbow points."""
+_LOW_BLOCK: tuple[dict[str, Point], Point] = ({"acts": (0.08, -0.44, 0.24)}, (0.9, -0.3, -0.5))
+"""The same of a sweep down before the thigh, which is drawn where it is asked for."""
 
 
-def block(rng: random.Random, *, times: int | None = None) -> Gesture:
+def block(rng: random.Random, *, times: int | None = None, low: bool = False) -> Gesture:
+    """A body that blocks, `times` or a few; `low`: below the hips."""
     form, side = rng.choices(list(_BLOCKS), (3, 3, 2, 2, 2))[0], rng.choice(SIDES)
+    form = "block-low" if low else form
     number = times or rng.choices((1, 2, 3), (6, 2, 1))[0]
-    stands = rng.random() < 0.45
+    stands = rng.random() < 0.45 and not low
     lead = rng.choice(SIDES)
     ready, start, stance = (0.1, -2.0, None) if stands else begun(rng, lead)
-    goes, pole = _BLOCKS[form]
+    goes, pole = _LOW_BLOCK if low else _BLOCKS[form]
     places = {(side if who == "acts" else OTHER_SIDE[side]): near(rng, place) for who, place in goes.items()}
     phases, seconds = [], ready + rng.uniform(0.1, 0.7)
     for _ in range(number):

@@ -16,7 +16,7 @@ from marey.drawing.postures import Posture
 from marey.drawing.sequels import Sequel
 from marey.drawing.stances import settle, step
 from marey.posing.limbs import FPS
-from marey.posing.standing import LEFT, OTHER_SIDE, StandingBody, stations
+from marey.posing.standing import LEFT, OTHER_SIDE, RIGHT, StandingBody, envelope, stations
 
 Array = NDArray[np.floating]
 
@@ -88,6 +88,45 @@ def shoot(rng: random.Random) -> Gesture:
     told = side if form == "shoot-one" else BOTH
     untrue = "|".join(word for word in ("rifle", "pistol", "shotgun", "machine") if word != _WORDS[form])
     return Gesture(firing.seconds, tuple(filter(None, kinds)), change, told, len(times), untrue=untrue)
+
+
+def drawn_pistol(rng: random.Random, side: str = "", shots: int = 0) -> Gesture:
+    """A pistol that is drawn from the hip, aimed and fired.
+
+    Args:
+        rng: decides everything that is not given.
+        side: of the hand; empty = right.
+        shots: how many; 0 = it is aimed alone.
+    """
+    side, pace = side or RIGHT, rng.uniform(0.95, 1.15)
+    back, up, fall = 0.045, rng.uniform(0.05, 0.08), rng.uniform(0.28, 0.36)
+    ready, gap = rng.uniform(0.3, 0.5), fall + rng.uniform(0.2, 0.4)
+    goes = np.cumsum([rng.uniform(0.2, 0.4), 0.35 * pace, 0.12, 0.22 * pace, 0.32 * pace])
+    times = [float(goes[-1]) + ready + k * gap for k in range(shots)]
+    lowers = (times[-1] + fall if times else float(goes[-1]) + ready) + rng.uniform(0.5, 0.8)
+    grip = np.array([rng.uniform(0.0, 0.05), rng.uniform(-0.02, 0.06), 0.46])
+    lean, twist = rng.uniform(3, 7), rng.uniform(8, 16)
+    way_of_hand = [_HOLSTER, _HOLSTER, _OUT, tuple(grip), tuple(grip)]
+
+    def change(body: StandingBody) -> None:
+        frames = len(body.joints)
+        way = envelope(frames, float(goes[0]), float(goes[1] - goes[0]), lowers - float(goes[1]), 0.7)
+        aimed = envelope(frames, float(goes[3]), float(goes[4] - goes[3]), lowers - float(goes[4]), 0.7)
+        kick = _recoil(frames, times, fall)
+        body.shift(-0.02 * aimed)
+        body.lean(lean * way - 3.0 * kick, "left")
+        respond(body, aimed, side, twist, 0.0)
+        settle(body)
+        hand = stations(frames, (float(goes[0]), *map(float, goes[1:])), way_of_hand)
+        body.hold(side, way, hand + kick[:, None] * np.array([0.0, up, -back]), lag=0.0, pole=(0.8, -0.6, -0.6))
+
+    told = ("shoot", "shoot-one", "shoot-drawn") if shots else ("aim", "aim-one", "aim-drawn")
+    return Gesture(lowers + 0.7 + rng.uniform(0.25, 0.5), told, change, side, max(shots, 1))
+
+
+_HOLSTER, _OUT = (0.1, -0.5, -0.02), (0.1, -0.36, 0.08)
+"""Metres from the shoulder of the hand at the grip of a pistol at the hip, and as it comes out; see
+`StandingBody.hold`."""
 
 
 class _Firing:

@@ -1,4 +1,4 @@
-"""Movements of sports: a tennis serve, bowling, a jump shot, a lunge of fencing.
+"""Movements of sports: a tennis serve, bowling, a jump shot, a volleyball spike, a lunge of fencing.
 
 They are drawn for the right hand, and mirrored for the left one.
 """
@@ -210,6 +210,58 @@ def jump_shot(rng: random.Random, side: str = "", times: int | None = None) -> G
         return come_together(done, feet)
 
     told = ["jump-shot"]
+    return on_feet(sequel, told, rng.uniform(0.3, 0.6), side=side or RIGHT, mirror=side == LEFT, times=times)
+
+
+def spike(rng: random.Random, side: str = "", times: int | None = None) -> Gesture:
+    """A high jump with both arms, at whose top one hand strikes a ball down over the net.
+
+    Args:
+        rng: decides sizes and times.
+        side: of the hand that strikes; empty = right.
+        times: how many; None = one.
+    """
+    pace, flight, starts, times = rng.uniform(0.95, 1.1), rng.uniform(0.58, 0.66), rng.uniform(0.2, 0.4), times or 1
+    behind = both(HandPlace((0.1, -0.34, -0.3), "shoulder", ELBOW_BACK))
+    up = both(HandPlace((0.04, 0.34, 0.26), "shoulder", ELBOW_OUT))
+    wound = {
+        RIGHT: HandPlace((0.16, 0.24, -0.18), "shoulder", (0.9, 0.3, -0.4)),
+        LEFT: HandPlace((-0.02, 0.4, 0.24), "shoulder", ELBOW_OUT),
+    }
+    struck = {
+        RIGHT: HandPlace((0.0, 0.48, 0.2), "shoulder", ELBOW_OUT),
+        LEFT: HandPlace((0.06, -0.1, 0.26), "shoulder", ELBOW_DOWN),
+    }
+    through = {
+        RIGHT: HandPlace((-0.1, -0.28, 0.38), "shoulder", ELBOW_OUT),
+        LEFT: HandPlace((0.1, -0.3, 0.16), "shoulder", ELBOW_DOWN),
+    }
+
+    def sequel(feet: StandingFeet) -> Sequel:
+        toes = {one: foot.tiptoe(46) for one, foot in feet.items()}
+        bent = Posture((0.0, 0.74, -0.05), (26, 0, 0), (16, 0, 0), (-34, 0, 0), hands=behind)
+        leaves = Posture((0.0, 0.98, 0.02), (0, 0, 0), (-4, 0, 0), (-14, 0, 0), hands=up, feet=toes)
+        lands = Posture((0.0, 0.94, 0.03), (10, 0, 0), (10, 0, 0), (-10, 0, 0), hands=through, feet=toes)
+
+        def shaped(share: float, rise: float) -> Posture:
+            off = {one: foot.tiptoe(58, -0.04, rise) for one, foot in feet.items()}
+            if share < 0.45:
+                return replace(leaves, spine=(-12, 0, 0), hands=wound, feet=off)
+            bends, hands = (4.0, struck) if share < 0.65 else (14.0, through)
+            return replace(leaves, spine=(bends, 0, 0), hands=hands, feet=off)
+
+        done = Sequel([starts])
+        for _ in range(times):
+            done.then(0.45 * pace, replace(bent, pelvis=(0.0, 0.88, -0.02)))
+            done.then(0.32 * pace, bent)
+            done.then(0.24, leaves)
+            fly(done, flight, leaves, lands, shaped)
+            flat = {one: foot.flat() for one, foot in feet.items()}
+            done.then(0.18, Posture((0.0, 0.8, 0.0), (18, 0, 0), (14, 0, 0), (-16, 0, 0), hands=through, feet=flat))
+            done.then(0.4, Posture((0.0, 0.92, 0.0), hands=both(LOWERED), feet=flat))
+        return come_together(done, feet)
+
+    told = ["volleyball-spike"]
     return on_feet(sequel, told, rng.uniform(0.3, 0.6), side=side or RIGHT, mirror=side == LEFT, times=times)
 
 

@@ -25,12 +25,16 @@ from marey.vocabulary.bearings import (
     DRAWN_AS,
     DRAWN_ON,
     SHOWN_BY,
+    Side,
     StatedBearing,
     load_bearings,
 )
+from marey.vocabulary.hurt_legs import hurt_leg
 from marey.vocabulary.in_place import goes_in_place
 
 _ACTS = {**DRAWN_AS, **DRAWN_ON}
+LIMP = "limp"
+"""Gait of who has a leg that hurts."""
 BEARING = "bearing"
 """Key of a manifest, and of the record of a row of a timeline."""
 
@@ -85,9 +89,10 @@ def borne_spans(request: Request, fps: float, frames: int) -> list[BorneSpan]:
         stated = fitting(_with_drawn(stated_bearings(said), action, said), action)
         return [BorneSpan(0, frames, stated, action, request.seed, said, request.open)] if stated else []
     whole = [each for each in stated_bearings(request.text.said) if each.whole] if request.is_sequence else []
+    hurt = hurt_leg(request.text.said.lower()) if request.is_sequence else ""
     found, carried = [], list[StatedBearing]()
     for k, row in enumerate(request.timeline):
-        action, own = action_of(row.text), stated_bearings(row.text.said)
+        action, own = action_of(row.text), _with_hurt_leg(stated_bearings(row.text.said), hurt)
         kept = [each for each in carried if not any(_replaces(other, each) for other in own)]
         posed = _posed(row, action)
         stated = fitting(_with_drawn([*whole, *kept, *own], action, row.text.said), posed)
@@ -99,6 +104,12 @@ def borne_spans(request: Request, fps: float, frames: int) -> list[BorneSpan]:
             end = min(round(row.end * fps), frames)
             found.append(BorneSpan(round(row.start * fps), end, stated, posed, request.seed + k, row.text.said))
     return found
+
+
+def _with_hurt_leg(stated: Sequence[StatedBearing], side: Side) -> Sequence[StatedBearing]:
+    """Return the bearings of a movement, of which a limp is on the leg that another movement of its prompt hurts, where
+    its own words name none: "is shot in the right leg and limps on"."""
+    return [replace(each, side=each.side or side) if each.bearing.gait == LIMP else each for each in stated]
 
 
 def _posed(row: TimedText, action: str) -> str:

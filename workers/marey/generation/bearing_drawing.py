@@ -13,6 +13,7 @@ from marey.generation.bearing import BorneSpan
 from marey.generation.bearing_times import BearingAmounts, amounts_of_bearings
 from marey.generation.gaits import GAITS, stomping
 from marey.generation.leans import trunk_shares
+from marey.generation.overhead import overhead
 from marey.generation.port import MotionFeatures
 from marey.motion.features import FeatureLayout, encode_all
 from marey.motion.filters import smooth_seconds
@@ -112,8 +113,8 @@ class _Drawing:
         share: float = 1.0,
     ) -> None:
         self._body, self._ways, self._rng, self._share = body, ways, rng, share
-        self._bearing: Bearing = stated.bearing
-        self._arms = arms_of(stated)
+        self._bearing: Bearing = overhead(stated.bearing) if stated.is_overhead else stated.bearing
+        self._arms = arms_of(stated, self._bearing)
         self._done, self._times = ways.done, ways.times
         self._is_exchanged = stated.acts == LEFT and len(self._arms) == len(ARMS)
         self._time = np.arange(len(ways.trunk)) / fps
@@ -250,13 +251,13 @@ class _Drawing:
         }[at]
 
 
-def arms_of(stated: StatedBearing) -> Mapping[str, ArmPose]:
-    """Return the poses of the arms by side.
+def arms_of(stated: StatedBearing, bearing: Bearing | None = None) -> Mapping[str, ArmPose]:
+    """Return the poses of the arms by side, of a `bearing` in place of the stated one if it is given.
 
     Where one arm acts, or both do the same, it is the side that the prompt names; else they are exchanged if it names
     the left, since poses of two arms act with the right one.
     """
-    arms, side = stated.bearing.arms, stated.acts
+    arms, side = (bearing or stated.bearing).arms, stated.acts
     if not side or stated.bearing.gait:
         return arms
     if len(arms) == 1:

@@ -33,7 +33,7 @@ from marey.drawing.punches import elbow_strike
 from marey.drawing.rides import bicycle_ride, horse_ride
 from marey.drawing.sidesteps import sidestep
 from marey.drawing.slips import slip_caught
-from marey.drawing.sports import bowling, fencing_lunge, jump_shot, tennis_serve
+from marey.drawing.sports import bowling, fencing_lunge, jump_shot, spike, tennis_serve
 from marey.drawing.staggers import stagger
 from marey.drawing.step_overs import FLAT, LOG, WALL, WIDE, step_over
 from marey.drawing.stumbles import stumble
@@ -69,6 +69,10 @@ _ONE_LUNGE = re.compile(
     r"\blunge\b(?! exercises?)|^lung(?:es|ing|ed)\b(?! (?:\w+ )?(?:with|on) (?:alternat\w+|each)| exercises?)"
 )
 """Words of a single lunge: of a noun, or of a verb."""
+_BY_TURNS = re.compile(
+    r"\b(?:alternat|switch|swapp|chang)\w+|\b(?:each|both|either)\b|\bturns?\b|\bthe other\b|\bleft\b.*\bright\b"
+)
+"""Words of lunges of both legs, however their verb stands."""
 _EXERCISE = re.compile(r"\W*lunges\W*")
 _REAR_LEG = re.compile(r"\b(left|right) (?:leg|foot|knee) (?:back|behind)\b")
 _TO_CHEST = re.compile(r"\b(?:chest|chin|belly|stomach|high)\b")
@@ -113,6 +117,11 @@ _TO_FEET = re.compile(r"\bfrom (?:one )?foot to\b")
 _HEAVY = re.compile(r"\b(?:heavy|heavily|massive|stuck|jammed|hard|huge|iron|shov\w+|strain\w*|struggl\w*)\b")
 _BOUNCES_S, _BRIEF_BOUNCES_S = (4.0, 5.0), (2.2, 2.8)
 """Seconds of bounces on the toes alone, and beside other things."""
+SHOWN_ONCE = frozenset(
+    {"tennis-serve", "javelin-throw", "discus-throw", "shot-put", "frisbee-throw", "bowling", "pitch", "bat-swing"}
+    | {"backfist-spun", "catch", "shelf-lift", "stumble"}
+)
+"""Movements that begin and end standing, and are drawn as often as is asked for, one after the other."""
 _ON_HANDS = re.compile(r"\bhigh\b|\b(?:straight|extended)[- ]arm|\bhands\b|\bpalms\b|\bfull\b")
 _GETS_DOWN = re.compile(
     r"^(?:gets?|getting|goes|go|going|drops?|dropping|moves?|comes?|lowers?|lowering|takes?|assum\w+)\b"
@@ -128,6 +137,13 @@ def named_movement(wish: FineWish, rng: random.Random, seconds: float | None) ->
     return None
 
 
+def times_again(prompt: str) -> int:
+    """Return how often a movement is done again that its drawing shows once, as the prompt says."""
+    named = (each for each in stated_bearings(prompt) if each.bearing.moves)
+    first = next(named, None)
+    return min(first.times or 1, MOST) if first is not None and first.name in SHOWN_ONCE else 1
+
+
 def names_movement(prompt: str) -> bool:
     """Return True if a prompt asks for a movement or a dance by name, for a roll of who lies, for a gait in place or
     for diagonal steps: no rule of an action is for it."""
@@ -137,7 +153,7 @@ def names_movement(prompt: str) -> bool:
 
 
 def _times(stated: StatedBearing) -> int | None:
-    number = stated_number(without_held_pose(stated.words))
+    number = stated.times or stated_number(without_held_pose(stated.words))
     return None if number is None else min(number, MOST)
 
 
@@ -155,7 +171,9 @@ def _lunges(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: 
     room = None if seconds is None else min(max(int((seconds - 1.5) / LUNGE_S), 1), MOST)
     rear = _REAR_LEG.search(words)
     side = OTHER_SIDE[rear[1]] if rear and form == "ahead" else stated.side
-    single = hold is not None or (_ONE_LUNGE.search(words) and not _EXERCISE.fullmatch(wish.prompt.lower()))
+    turns = _BY_TURNS.search(words) is not None
+    one = _ONE_LUNGE.search(words) and not (turns or _EXERCISE.fullmatch(wish.prompt.lower()))
+    single, side = hold is not None or one, "" if turns and form != "aside" else side
     times = _times(stated) or (1 if single else room)
     return lunges(rng, form, times, side, hold)
 
@@ -285,8 +303,13 @@ def _catch(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: f
 
 def _jump_shot(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
     del seconds
-    number = stated_number(_POINTS.sub("", stated.words))
+    number = stated.times or stated_number(_POINTS.sub("", stated.words))
     return jump_shot(rng, _hand(stated, wish), None if number is None else min(number, MOST))
+
+
+def _spike(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del seconds
+    return spike(rng, _hand(stated, wish), _times(stated))
 
 
 def _fencing_lunge(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
@@ -403,6 +426,7 @@ NAMED: Mapping[str, Callable[[StatedBearing, FineWish, random.Random, float | No
     "peek": _peek,
     "catch": _catch,
     "jump-shot": _jump_shot,
+    "volleyball-spike": _spike,
     "fencing-lunge": _fencing_lunge,
     "shelf-lift": _shelf_lift,
     "shoe-tied": _shoe_tied,

@@ -25,12 +25,13 @@ from marey.drawing.seats import sit_legs_crossed
 from marey.generation.blocking import block_asked_for
 from marey.generation.carrying import stated_load
 from marey.generation.dancing import dance_asked_for
+from marey.generation.drawn_guns import drawn_gun
 from marey.generation.fine_wish import FineWish
 from marey.generation.hits import stated_hit
 from marey.generation.hopping import hops_away, jumps_away
 from marey.generation.kicking import ball_kick_asked_for, kick_asked_for
 from marey.generation.kneeling import drops_asked_for
-from marey.generation.named import named_movement
+from marey.generation.named import named_movement, times_again
 from marey.generation.raising import stated_raise
 from marey.generation.running_back import run_back_asked_for
 from marey.generation.stairs import stairs_asked_for
@@ -122,6 +123,7 @@ STATED: Mapping[str, Statement] = {
     "kick": kick_asked_for,
     "kick-ball": ball_kick_asked_for,
     "block": block_asked_for,
+    **dict.fromkeys(("aim", "shoot"), drawn_gun),
     "cheer": _jumps_for_joy,
     "wave": _waves,
     "sit-floor": _cross_legged,
@@ -171,5 +173,6 @@ def stated_features(
     first = state(wish, rng, None)
     if first is None:
         return None
-    joints = drawn_in_place(lambda seconds: state(wish, rng, seconds) or first, 1, frames if wish.fixed else None, rng)
+    times, fixed = times_again(wish.prompt) if state is named_movement else 1, frames if wish.fixed else None
+    joints = drawn_in_place(lambda seconds: state(wish, rng, seconds) or first, times, fixed, rng)
     return None if joints is None else encode_all(layout, joints)

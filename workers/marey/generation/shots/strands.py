@@ -12,13 +12,13 @@ from marey.generation.port import Limits, Request
 from marey.generation.shots.going_on import is_way, passes_over
 from marey.generation.shots.headings import heading_change
 from marey.generation.shots.levels import lifted
+from marey.generation.shots.raised_arms import TURNING
 from marey.generation.shots.timeline_plan import TimelinePart, even_parts
 from marey.generation.shots.way_lengths import WayRow
 from marey.generation.shots.windows import CONTEXT, Float32, FrameGap, Window, crossfaded, most_frames
 from marey.generation.timed import TimedText, part_seed
 from marey.generation.wish import action_of
 from marey.motion.features import FeatureLayout
-from marey.selector.matching import TURNING
 from marey.text.features import TextFeatures
 from marey.vocabulary.bearing_words import stated_bearings
 from marey.vocabulary.counts import STEPPING, stated_count

@@ -17,6 +17,7 @@ from marey.generation.distances import as_far, distance_of, frames_of_distance, 
 from marey.generation.port import Limits
 from marey.generation.shots.going_on import is_onward, is_way
 from marey.generation.shots.raised_arms import TURNING
+from marey.generation.timed import CUT
 from marey.generation.wish import action_of
 from marey.motion.courses import course_of
 from marey.motion.features import FeatureLayout
@@ -78,10 +79,12 @@ def ways_back(said: str, rows: Sequence[WayRow]) -> dict[int, int]:
 
 
 def as_long_as(there: Float32, back: Float32, layout: FeatureLayout) -> tuple[Float32, Float32]:
-    """Return features (T, D) of two ways of about the same length: the longer one ends sooner."""
+    """Return features (T, D) of two ways of about the same length: the longer one ends sooner. The way back keeps what
+    the transition to it takes, which is much of a run."""
     lengths = distance_of(there, layout), distance_of(back, layout)
     if lengths[1] >= lengths[0]:
-        cut = as_far(back, layout, lengths[0])
+        lost = float(passed_on(course_of(back, layout), layout.fps)[: CUT + 1][-1])
+        cut = as_far(back, layout, min(lengths[0] + lost, lengths[1]))
         return there, back if cut is None else cut
     cut = as_far(there, layout, lengths[1])
     return (there if cut is None else cut), back
