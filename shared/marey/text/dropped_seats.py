@@ -31,6 +31,24 @@ _DOWN = re.compile(
     (?P<how>(?:\ \w+ly)?)\ down\b(?!\ (?:on|onto|in|into|to|over)\b)""",
     re.IGNORECASE | re.VERBOSE,
 )
+_WALL = r"(?:wall|door|doorframe|pillar|column|post|pole|tree|trunk|fence|locker|lockers|car|counter|railing|rock)"
+_TO_FLOOR = r"(?:\ down|\ to\ the\ (?:floor|ground))"
+_BACK_AT = r"(?:(?:with\ )?(?:his|her|their)\ back\ )?"
+_DOWN_WALL = re.compile(
+    rf"""\b(?:lean(?!\w*\ down)|slump|slid|slide|sink|sank|drop|collaps|crumpl|slip|lower)
+    (?P<end>e?s|p?ed|p?ing|e|p?s)?(?:\ (?:him|her|them|it)sel(?:f|ves))?
+    (?P<how>(?:\ (?:\w+ly|exhausted|tired|weakly|back|backwards?))*)
+    \ (?:down\ {_BACK_AT}(?:(?:against|along|on|to\ the\ (?:floor|ground)\ against)\ )?{_OF}{_WALL}
+    |{_BACK_AT}(?:against|along)\ {_OF}{_WALL}
+    (?:(?:,\ |,?\ and\ |\ to\ )(?:slid(?:es?|ing)|sink(?:s|ing)?|slips?|slipping)(?:\ \w+ly)?{_TO_FLOOR}+|{_TO_FLOOR}+)
+    |to\ the\ (?:floor|ground)\ {_BACK_AT}against\ {_OF}{_WALL})
+    (?:\ (?:to|onto)\ the\ (?:floor|ground))?
+    (?:(?:\ to|\ until\ (?:he|she)\ is|\ into|\ and)\ (?:a\ )?(?:sits?|sitting|seated|squat)
+    (?:\ down)?(?:\ (?:position|on\ the\ (?:floor|ground)))?)?
+    (?=$|[.,;!]|\ (?:and|then|exhausted|in|with|while|crying|sobbing|weeping|for)\b)""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""A body that comes down to a seat on the floor, its back at a wall: "slumps down against the wall"."""
 _SEAT, _BED = (re.compile(rf"\b{names}\b", re.IGNORECASE | re.VERBOSE) for names in (_SEATS, _BEDS))
 _DEAD = re.compile(r"\b(?:dead|die[sd]?|dying|shot|killed|lifeless(?:ly)?|faint\w*|unconscious)\b", re.IGNORECASE)
 
@@ -39,8 +57,16 @@ def with_seats_taken(prompt: str) -> str:
     """Return a prompt whose people sit down on the seat that they drop onto, or lie down on the bed."""
     if _DEAD.search(prompt):
         return prompt
-    prompt = _ONTO_SEAT.sub(_taken, prompt)
+    prompt = _ONTO_SEAT.sub(_taken, _DOWN_WALL.sub(_at_wall, prompt))
     return _DOWN.sub(_sits, _ONTO_IT.sub(_on_it, prompt))
+
+
+def _at_wall(found: re.Match[str]) -> str:
+    """Return who sits down on the floor; "slumped against the wall" is there already."""
+    end = (found["end"] or "").lower()
+    if end.endswith("ed"):
+        return found[0]
+    return f"{_as_verb(found, lies=False)} down on the floor{found['how']}"
 
 
 def _taken(found: re.Match[str]) -> str:

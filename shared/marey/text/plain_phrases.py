@@ -76,6 +76,12 @@ _EXAMINES = re.compile(
     re.IGNORECASE,
 )
 """A gaze down, of which the readers make who kneels or picks up."""
+_UPHILL = re.compile(
+    r"(?P<push>\b(?:push|shov|heav)\w*\b[^.;]*?) up (?:(?:a|an|the) )?(?:\w+ )?"
+    r"(?:hill|slope|ramp|mountain|incline|hillside)\b",
+    re.IGNORECASE,
+)
+"""A way uphill of who pushes something, of which models read a climb."""
 _LAND = (
     r"(?:,? (?:and )?(?:then )?land(?:s|ing)?(?: (?:softly|safely|lightly))?"
     r"(?: (?:on|with) (?:(?:both|the|his|her|their"
@@ -150,7 +156,7 @@ def with_plain_phrases(prompt: str) -> str:
     text = _WAY_AND_ANOTHER.sub(_with_verb, text)
     text = _EXAMINES.sub(lambda it: f"{in_form_of(it['ing'] or it['s'] or '', 'look')} down at the ground", text)
     text = _JUMPS_BACK_OVER.sub(r"\g<jump> backwards", text)
-    text = _PUTS_IT.sub(_puts_box, text)
+    text = _PUTS_IT.sub(_puts_box, _UPHILL.sub(r"\g<push>", text))
     text = _INTO_GUARD.sub(_steps_into_guard, text)
     return _SPINS_AND_FREEZES.sub(lambda it: f"{it['spins']}, then stand{(it['s'] and 's') or ''} still", text)
 

@@ -34,6 +34,19 @@ _LIKE = re.compile(
     r"|(?:in|with) the (?:manner|style|way) of"
     r"|(?:imitat|pretend|impersonat)(?:e|es|ing)(?: to be)?|acts?(?:ing)? like) $"
 )
+_COWER, _COWERS_ON_WAY = "cower", "shrinking"
+_BACKS_AWAY = re.compile(
+    r"\b(?:back(?:s|ing)?|steps?|stepping|walk(?:s|ing)?|mov(?:es?|ing)|shuffl(?:es?|ing)|edg(?:es?|ing)|scrambl(?:es?|ing)"
+    r"|creep(?:s|ing)?)(?: \w+ly)? (?:away|backwards?|back|off|up)\b|\bretreat(?:s|ing)?\b"
+)
+_IN_TURN = re.compile(r"\b(?:then|before|after|until)\b|[;.] \w")
+"""Words of one thing after the other."""
+_HOW_QUICK = re.compile(
+    r" (?:sharply|crisply|smartly|briskly|quickly|swiftly|slowly|formally|properly|firmly|gently|lightly|helplessly"
+    r"|deeply|loudly|quietly|softly|vigorously|suddenly|briefly|casually|politely|respectfully|solemnly)"
+    r"(?=\W*$|[,.;!]| (?:and|then|before|while|as)\b)"
+)
+"""Words behind those of a gesture that say how it is done, and nothing of what comes behind it."""
 _DENIED = re.compile(
     r"\b(?:(?:without|not|never|no|n't|don't|doesn't)\s+(?:(?!and\b|then\b)\w+\s+){0,2}"
     r"|(?:avoids?|instead of)\s+"
@@ -181,7 +194,7 @@ def bearing_spans(prompt: str) -> tuple[BearingSpan, ...]:
         apart = not spans or each.start >= spans[-1].end
         if (apart or _is_of_who(each, spans[-1])) and not _is_denied(text, each.start):
             spans.append(each)
-    return tuple(_of_limps(text, _of_zombies(spans)))
+    return tuple(_of_limps(text, _of_cowards(text, _of_zombies(spans))))
 
 
 def _is_denied(text: str, start: int) -> bool:
@@ -212,6 +225,14 @@ def _of_zombies(spans: Sequence[BearingSpan]) -> Iterator[BearingSpan]:
             continue
         out = ahead and each.stated.name == "arms-wide" and each.stated.words.endswith(" out")
         yield replace(each, stated=replace(each.stated, name="arms-ahead")) if out else each
+
+
+def _of_cowards(text: str, spans: Iterable[BearingSpan]) -> Iterator[BearingSpan]:
+    """Yield words, of who cowers with the way back on which it does so: "cowers in fear, backing away"."""
+    backs = _BACKS_AWAY.search(text) is not None and _IN_TURN.search(text) is None
+    for each in spans:
+        cowers = backs and each.stated.name == _COWER
+        yield replace(each, stated=replace(each.stated, name=_COWERS_ON_WAY)) if cowers else each
 
 
 def _matches(text: str) -> Iterator[BearingSpan]:
@@ -302,7 +323,9 @@ def _words_of(text: str, name: str, kind: str, match: re.Match[str]) -> Iterator
         if over is None and stated.bearing.work and len(stated.bearing.arms) > 1:
             over = _WITH_BOTH.match(text, match.end())
         if hand is None:
-            yield BearingSpan(match.start(), match.end() if over is None else over.end(), stated)
+            end = match.end() if over is None else over.end()
+            quick = _HOW_QUICK.match(text, end) if stated.bearing.gesture else None
+            yield BearingSpan(match.start(), end if quick is None else quick.end(), stated)
         else:
             yield BearingSpan(match.start(), hand.end(), replace(stated, side=_side(hand[0])))
 

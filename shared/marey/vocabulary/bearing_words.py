@@ -39,6 +39,25 @@ _UNTIDY = tuple(
 )
 """Verbs of what is seen in a body without what is seen, spaces and commas that stand twice or at the ends, words that
 join nothing, and "an" before a consonant."""
+_FACE = re.compile(
+    r"[\s,;]*(?:\b(?:and|with|while) )?\b(?:(?:his|her|their|its|the) )?"
+    r"(?:(?:eyes?|lips?|chin|teeth|mouth|jaw|brows?|voice)"
+    r" (?:(?:is|are) )?(?:closed|shut|wide|open|clenched|furrowed|shaking|quivering|trembling|chattering|red|breaking"
+    r"|squeezed shut|half closed)|tears (?:streaming|running|rolling|flowing|pouring)"
+    r"(?: down (?:his|her|their) (?:face|cheeks))?"
+    r"|(?:hand|fist) (?:over|before|to|at|on|covering) (?:(?:his|her|their|the) )?mouth)(?: wide| tight(?:ly)?| open)?"
+    r"(?=\s*(?:$|[,.;!]|(?:and|while)\b))",
+    re.IGNORECASE,
+)
+"""Faces, which no motion shows, and the hand that is at the mouth of who coughs or yawns."""
+_HEAVES = re.compile(
+    r"[\s,;]*(?:\b(?:and|with|while) )?\b(?:(?:his|her|their|its|the|whole) )*(?:shoulders?|body|frame|chest|back)"
+    r" (?:(?:is|are) )?(?:visibly )?"
+    r"(?:shaking|heaving|trembling|quivering|jerking|convulsing|shuddering|rising and falling)"
+    r"(?: \w+ly)?(?: with (?:(?:each|every|his|her) )?\w+)?(?=\s*(?:$|[,.;!]|(?:and|while)\b))",
+    re.IGNORECASE,
+)
+"""A trunk that moves with its breath, as it is drawn of who sobs or is winded."""
 _ONLY_LENGTH = re.compile(
     r"\W*(?:for|lasting|during) (?:about |around |some )?[\w.]+ ?(?:s|secs?|seconds?|moments?|while)\W*"
 )
@@ -151,6 +170,7 @@ def _without_joint(part: str) -> str:
 
 def _acts(text: str) -> bool:
     """Return True if something else is done in a text than bearing oneself in some way."""
+    text = _HEAVES.sub("", _FACE.sub("", text))
     named = named_by_adjectives().match(text.lower())
     if named is not None and named["noun"] not in known_verb_forms():
         return False
@@ -181,13 +201,15 @@ def _without(prompt: str, found: Sequence[BearingSpan]) -> tuple[str, tuple[int,
         if joined is not None and not whole and not says_more(kept):
             length = len(kept.rstrip())
             kept, places, at = f"{kept[:length]} ", [*places[:length], each.start], at + joined.end()
-    return _tidied(kept + prompt[at:], [*places, *range(at, len(prompt))])
+    heaves = any(each.stated.bearing.sob or each.stated.bearing.heave for each in found)
+    patterns = (_FACE, *((_HEAVES,) if heaves else ()), *_UNTIDY)
+    return _tidied(kept + prompt[at:], [*places, *range(at, len(prompt))], patterns)
 
 
-def _tidied(text: str, places: Sequence[int]) -> tuple[str, tuple[int, ...]]:
+def _tidied(text: str, places: Sequence[int], patterns: Sequence[re.Pattern[str]]) -> tuple[str, tuple[int, ...]]:
     """Return a text without what is untidy, and where each of its characters was; empty if nothing is done in it."""
     left = list(range(len(text)))
-    for pattern in _UNTIDY:
+    for pattern in patterns:
         joined = "".join(text[k] for k in left)
         gone = {k for found in pattern.finditer(joined) for k in range(found.start(), found.end())}
         left = [k for n, k in enumerate(left) if n not in gone]

@@ -160,6 +160,7 @@ class Bearing:
         work: something that is done ("saws a plank"), not a way to do something else.
         moves: it is a movement of the whole body (`marey.generation.named`), made in place of a body that stands.
         mood: it shows in trunk and head beside whatever the arms do.
+        approximated: it is only like what its words ask for, which no motion shows: scope says so.
         across: the arm that acts is not on the side that the words name: "rubs his left shoulder".
         also: actions beside which all of it is drawn, though the body is not upright in them, or its arms not free.
         arms: by `left` and `right`, those that it moves.
@@ -190,6 +191,7 @@ class Bearing:
     work: bool = False
     moves: bool = False
     mood: bool = False
+    approximated: bool = False
     across: bool = False
     also: tuple[str, ...] = ()
     keys: Keys | None = None

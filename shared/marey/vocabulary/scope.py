@@ -240,10 +240,17 @@ class ScopeMatcher:
         if not any(map(bare.fits, named or {STANDING})) or not (named or does):
             return None
         alone = [each for each in bare.stated if not each.bearing.lasts or not rest]
-        drawn = tuple(NamedAction(each.words[:MAX_TEXT], "known") for each in alone)
+        alike = [each for each in bare.stated if each.bearing.approximated]
+        like = next((name for name in ("walk", "run") if name in named), STANDING)
+        drawn = (
+            *(NamedAction(each.words[:MAX_TEXT], "close", read_as=like) for each in alike),
+            *(NamedAction(each.words[:MAX_TEXT], "known") for each in alone if each not in alike),
+        )
         others = rest.actions if rest and (named or not drawn) else ()
         flags: tuple[Flag, ...] = tuple(
-            flag for flag in self._match(bare.prompt, lists).flags if flag != "no-action" or not (named or drawn)
+            flag
+            for flag in self._match(bare.prompt, lists).flags
+            if not (flag == "no-action" and (named or drawn)) and not (flag == "other-subject" and rest and named)
         )
         return Scope((*others, *drawn), flags, left=rest.left if rest and named else None)
 

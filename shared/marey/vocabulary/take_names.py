@@ -5,6 +5,8 @@ from __future__ import annotations
 import itertools
 import re
 
+from marey.vocabulary.inflection import third_person
+from marey.vocabulary.lengths import known_verb_forms
 from marey.vocabulary.word_lists import load_word_lists
 
 _NAME = re.compile(r"(?<![\w/.@])\w*[^\W_]_[^\W_]\w*(?![\w/@])")
@@ -51,6 +53,17 @@ _DEATHS = frozenset({"death", "deaths", "die", "dies", "dying", "dead"})
 """First parts of takes of who dies; what such a body did before is no movement behind it: "DEATH_walk_forward"."""
 _WAYS = frozenset("walk walking run running sprint sprinting jog jogging".split())  # noqa: SIM905
 _RESTS = frozenset({"idle", "stand", "sit", "wait", "sneak", "crawl", "dance", "talk"})
+_BREATHS = frozenset({"breathe", "breathes", "breathing", "breath"})
+_HARD = frozenset({"heavy", "heavily", "hard", "deep", "deeply", "fast", "exhausted", "out", "after"})
+"""Words of breaths that show."""
+_FIGHTS = frozenset({"combat", "fight", "fighting", "battle"})
+_UPRIGHT = frozenset({"standing", "stand", "stood"})
+_STANDS = re.compile(
+    r"\b(?:stand|standing|stood)(?= (?:up|down|still|guard|around|ready|at|by|on|in|with|off|long|broad|back|split)\b)"
+)
+"""A posture that is what is done, or part of its name: "stand up", "standing long jump"."""
+_OTHER_POSTURE = re.compile(r"^(?:sit|seat|crouch|kneel|squat|l(?:ie|y)|lay|prone|supine|get|rise|to$|from$|up$|down$)")
+"""Beginnings of words beside which a body comes to stand, or leaves it: "sit_to_stand"."""
 _ORDERED = frozenset({"then", "and", "to"})
 """Parts between those of one fall: "DEATH_knees_then_forward"."""
 _SUCH = frozenset({"old", "young", "elderly", "little", "big", "fat", "tall", "small", "heavy"})
@@ -87,7 +100,34 @@ def _words_of(name: re.Match[str]) -> str:
         said = said[1:]
     if said and said[0] in _DEATHS:
         said = [word for word in said if word not in _ORDERED | _WAYS]  # one fall
-    return " ".join(_of_hit(_person_first(said))) or name[0].replace("_", " ")
+    said = _without_rest(_of_hit(_person_first(said)))
+    return " ".join(_with_verb(said)) or name[0].replace("_", " ")
+
+
+def _without_rest(said: list[str]) -> list[str]:
+    """Return the words of a take without those of a body that stands and breathes, where others say what it does:
+    "combat idle" of "idle combat breathing", "soldier reload" of "soldier reload standing"."""
+    if "idle" in said and not _HARD & set(said):
+        said = [word for word in said if word not in _BREATHS]
+        if fights := [word for word in said if word in _FIGHTS]:
+            said = [*fights, "idle", *(word for word in said if word not in _FIGHTS | {"idle"})]
+    if _STANDS.search(" ".join(said)) or any(_OTHER_POSTURE.match(word) for word in said):
+        return said
+    acts = [word for word in said if word not in _UPRIGHT]
+    people = load_word_lists().people
+    return acts if any(word in known_verb_forms() and word not in people for word in acts) else said
+
+
+def _with_verb(said: list[str]) -> list[str]:
+    """Return the words of a take that begins with who does it as a sentence: "soldier reloads" of "soldier reload"."""
+    at = 2 if said and said[0] in _SUCH else 1
+    names_take = _WAYS | _RESTS | _DEATHS | _HITS | _REACTS
+    if len(said) <= at or said[at - 1] not in load_word_lists().people or said[at] in names_take:
+        return said
+    verb = said[at]
+    if verb not in known_verb_forms() or third_person(verb) not in known_verb_forms():
+        return said
+    return [*said[:at], third_person(verb), *said[at + 1 :]]
 
 
 def _person_first(said: list[str]) -> list[str]:

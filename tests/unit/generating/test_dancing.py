@@ -20,6 +20,7 @@ PROMPTS = {
     "bachata": "bachata steps",
     "waltz": "an old couple waltzes",
     "hip-hop": "a hip-hop groove",
+    "victory": "does a victory dance",
 }
 
 

@@ -42,3 +42,15 @@ def test_a_mood_has_a_pace_of_its_own_where_the_words_name_none(
     prompt: str, action: str, low: float, high: float
 ) -> None:
     assert low <= AskedPace.of(prompt, action).of_drawn(3.0, at_pace=False) <= high
+
+
+@pytest.mark.parametrize(
+    ("prompt", "action", "share"),
+    [
+        ("pushes a stalled car with great effort", "push", 0.7),
+        ("pushes a shopping cart", "push", 1.0),
+        ("a tired man pushes a cart", "push", 1.0),
+    ],
+)
+def test_who_pushes_something_heavy_is_slow(prompt: str, action: str, share: float) -> None:
+    assert AskedPace.of(prompt, action).share == share

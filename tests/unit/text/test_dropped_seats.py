@@ -16,6 +16,11 @@ from marey.text.dropped_seats import with_seats_taken
         ("a man plopping down on a stool", "a man sitting down heavily on a stool"),
         ("collapses onto the bed", "lies down heavily on the bed"),
         ("flops down", "sits down heavily on the floor"),
+        ("slumps down against the wall", "sits down on the floor"),
+        ("slides down the wall to sit", "sits down on the floor"),
+        ("sinks to the floor with his back against a pillar", "sits down on the floor"),
+        ("leans against the wall and slides to the floor", "sits down on the floor"),
+        ("a man sliding down the door, crying", "a man sitting down on the floor, crying"),
     ],
 )
 def test_who_drops_onto_a_seat_sits_down(prompt: str, told: str) -> None:
@@ -32,6 +37,9 @@ def test_who_drops_onto_a_seat_sits_down(prompt: str, told: str) -> None:
         "falls off the chair",
         "leans on the table and drops onto it",
         "sinks to his knees",
+        "slumped against the wall",
+        "leans against the wall",
+        "slides down the pole to the lower deck",
     ],
 )
 def test_other_falls_stay(prompt: str) -> None:

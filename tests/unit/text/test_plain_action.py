@@ -59,7 +59,7 @@ def test_it_comes_before_the_prompt(prompt: str, action: str | None, read: str) 
     ("prompt", "action"),
     [
         ("The waiter takes a bow.", "bow"),
-        ("A yogi stands in tree pose", "balance"),
+        ("A yogi stands on one leg", "balance"),
         ("he walks and turns a corner", "turn"),
         ("He walks slowly, no running", "walk"),
         ("she bows and then waves", None),  # several

@@ -88,3 +88,15 @@ def test_what_a_clause_leaves_out_is_said_again(prompt: str, said: str) -> None:
 )
 def test_other_phrases(prompt: str, said: str) -> None:
     assert with_plain_phrases(prompt) == said
+
+
+@pytest.mark.parametrize(
+    ("prompt", "said"),
+    [
+        ("pushes a boulder up the hill", "pushes a boulder"),
+        ("a man shoves a cart up a steep ramp, then rests", "a man shoves a cart, then rests"),
+        ("walks up the hill", "walks up the hill"),
+    ],
+)
+def test_who_pushes_a_thing_uphill_does_not_climb(prompt: str, said: str) -> None:
+    assert with_plain_phrases(prompt) == said

@@ -56,6 +56,7 @@ class _Dance:
 
 _WAIST = {LEFT: (0.13, -0.3, 0.24), RIGHT: (0.13, -0.3, 0.24)}
 _FRAME = {LEFT: (0.34, 0.02, 0.26), RIGHT: (0.12, -0.14, 0.34)}
+_ALOFT = {LEFT: (0.16, 0.36, 0.12), RIGHT: (0.16, 0.36, 0.12)}
 _LOW = {LEFT: (0.16, -0.36, 0.16), RIGHT: (0.16, -0.36, 0.16)}
 DANCES: Mapping[str, _Dance] = {
     "salsa": _Dance(
@@ -143,6 +144,20 @@ DANCES: Mapping[str, _Dance] = {
         0.06,
         _LOW,
         0.18,
+    ),
+    "victory": _Dance(
+        (0.42, 0.48),
+        (
+            _Step(1, LEFT, (0.24, 0.05)),
+            _Step(1, RIGHT, (0.2, 0.0), True),
+            _Step(1, RIGHT, (0.0, 0.05)),
+            _Step(1, LEFT, (0.04, 0.0), True),
+        ),
+        (8.0, 14.0),
+        (0.07, 0.03),
+        0.09,
+        _ALOFT,
+        0.14,
     ),
 }
 """Dances by name."""

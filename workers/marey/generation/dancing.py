@@ -15,6 +15,11 @@ _NAMES: Mapping[str, re.Pattern[str]] = {
     "cha-cha": re.compile(r"\bcha[ -]?cha(?:[ -]?cha)?\b"),
     "bachata": re.compile(r"\bbachata\b"),
     "waltz": re.compile(r"\bwaltz(?:es|ing|ed)?\b"),
+    "victory": re.compile(
+        r"\b(?:victory|celebration|celebrat(?:ory|ing)|touchdown|winners?'?s?|triumph(?:ant)?|goal|happy|joyful)"
+        r" danc(?:e|es|ing)\b"
+        r"|\bdanc(?:e|es|ing) (?:in|of|for|with) (?:victory|triumph|joy|celebration|celebrating)\b|\bvictory jig\b"
+    ),
     "hip-hop": re.compile(r"\bhip[ -]?hop\b(?=.*\b(?:bounc|groov|basic|two[ -]step|step[ -]touch)\w*)"),
 }
 """Words of dances."""

@@ -12,9 +12,11 @@ import re
 from collections.abc import Callable, Mapping
 
 from marey.drawing.bat_swings import bat_swing
+from marey.drawing.blade_spins import spun_slash
 from marey.drawing.bounces import toe_bounces
 from marey.drawing.burpees import burpees
 from marey.drawing.close_blows import headbutt, slap, spun_backfist
+from marey.drawing.cricket import cricket_ball
 from marey.drawing.dives import cover_dive, ground_slide, side_dive
 from marey.drawing.doors import pulled_door, pushed_door
 from marey.drawing.errands import cower, curtsy, rowing, shelf_lift, shoe_tied
@@ -26,6 +28,7 @@ from marey.drawing.knee_raises import knee_raise
 from marey.drawing.knee_strikes import knee_strike
 from marey.drawing.lunges import lunges
 from marey.drawing.moonwalks import moonwalk
+from marey.drawing.paddling import paddling
 from marey.drawing.peeks import catch, peek
 from marey.drawing.pitches import pitch
 from marey.drawing.planks import plank
@@ -38,6 +41,8 @@ from marey.drawing.staggers import stagger
 from marey.drawing.step_overs import FLAT, LOG, WALL, WIDE, step_over
 from marey.drawing.stumbles import stumble
 from marey.drawing.vacuuming import vacuuming
+from marey.drawing.wide_stances import sumo_stomps, tai_chi
+from marey.drawing.yoga import yoga_pose
 from marey.generation.dancing import named_dance
 from marey.generation.fine_wish import FineWish
 from marey.generation.stepping_aside import goes_diagonally
@@ -122,6 +127,26 @@ SHOWN_ONCE = frozenset(
     | {"backfist-spun", "catch", "shelf-lift", "stumble"}
 )
 """Movements that begin and end standing, and are drawn as often as is asked for, one after the other."""
+_POSES = {
+    "warrior-three": re.compile(r"\bwarrior (?:three|3|iii|pose (?:three|3|iii))\b"),
+    "warrior-one": re.compile(r"\bwarrior (?:one|1|i|pose (?:one|1|i))\b"),
+    "warrior-two": re.compile(r"\bwarrior\b|\bvirabhadrasana\b"),
+    "tree": re.compile(r"\btree\b|\bvrksasana\b"),
+    "mountain": re.compile(r"\bmountain\b|\btadasana\b"),
+    "chair": re.compile(r"\bchair\b|\butkatasana\b"),
+    "triangle": re.compile(r"\btriangle\b|\btrikonasana\b"),
+    "downward-dog": re.compile(r"\bdog\b"),
+}
+"""Poses of yoga by their words."""
+_RUNS_UP = re.compile(r"\b(?:run|jog|sprint|charg)\w*\b")
+_ONE_BLADE = re.compile(
+    r"\b(?:canoes?|canoeing|paddle ?board\w*|sup|rafts?|dinghy|dugout|outrigger|gondola|boats?|pirogue)\b"
+)
+_TWO_HANDED = re.compile(
+    r"\b(?:two|both)[- ]hand(?:ed|s)|\b(?:great ?sword|axe|katana|claymore|staff|halberd|hammer|scythe)\b"
+)
+_TURNS = {"720": 2, "double": 2, "twice": 2, "two": 2, "1080": 3, "triple": 3, "three": 3}
+_ROUNDS = re.compile(r"\b(720|1080|double|triple|twice|two|three)\b")
 _ON_HANDS = re.compile(r"\bhigh\b|\b(?:straight|extended)[- ]arm|\bhands\b|\bpalms\b|\bfull\b")
 _GETS_DOWN = re.compile(
     r"^(?:gets?|getting|goes|go|going|drops?|dropping|moves?|comes?|lowers?|lowering|takes?|assum\w+)\b"
@@ -398,6 +423,43 @@ def _handstand(stated: StatedBearing, wish: FineWish, rng: random.Random, second
     return handstand(rng, stated.side, times=times, hold=hold or room)
 
 
+def _yoga(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    text = stated.words
+    pose = next(pose for pose, words in _POSES.items() if words.search(text))
+    room = None if seconds is None else max(seconds - 4.6, 1.0)
+    return yoga_pose(rng, pose, stated.side or wish.side, stated_hold(wish.prompt) or room)
+
+
+def _cricket(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del seconds
+    return cricket_ball(rng, _hand(stated, wish), brief=bool(_RUNS_UP.search(wish.beside[0].lower())))
+
+
+def _paddling(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    one = _ONE_BLADE.search(stated.words) is not None
+    return paddling(rng, _times(stated), seconds, one_sided=one, side=stated.side or wish.side)
+
+
+def _spun_slash(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del seconds
+    text = wish.prompt.lower()
+    rounds = _ROUNDS.search(stated.words)
+    both = _TWO_HANDED.search(text) is not None
+    return spun_slash(rng, _hand(stated, wish), _TURNS[rounds[1]] if rounds else None, two_handed=both)
+
+
+def _sumo(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del wish, seconds
+    both = re.search(r"\bleft\b.*\bright\b|\bright\b.*\bleft\b", stated.words)
+    times = _times(stated) or (1 if stated.side and not both else 2)
+    return sumo_stomps(rng, stated.side, times)
+
+
+def _tai_chi(stated: StatedBearing, wish: FineWish, rng: random.Random, seconds: float | None) -> Gesture:
+    del stated
+    return tai_chi(rng, seconds or (9.0 if any(wish.beside) else None))
+
+
 NAMED: Mapping[str, Callable[[StatedBearing, FineWish, random.Random, float | None], Gesture]] = {
     "burpee": _burpees,
     "lunges": _lunges,
@@ -442,5 +504,11 @@ NAMED: Mapping[str, Callable[[StatedBearing, FineWish, random.Random, float | No
     "plank": _plank,
     "handstand": _handstand,
     "bat-swing": _bat_swing,
+    "yoga-pose": _yoga,
+    "cricket-ball": _cricket,
+    "paddling": _paddling,
+    "spun-slash": _spun_slash,
+    "sumo-stomp": _sumo,
+    "tai-chi": _tai_chi,
 }
 """Movements by the bearing that names them."""

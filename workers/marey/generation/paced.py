@@ -136,8 +136,8 @@ class AskedPace:
 
 
 def _pace_of_bearing(prompt: str, action: str) -> Pace:
-    """Return the pace of a walk or run that the bearing of its body brings with it: slow of a tired one."""
-    if action not in WAY_SPEEDS:
-        return ""
-    paces: list[Pace] = [each.bearing.pace for each in stated_bearings(prompt) if each.bearing.pace]
+    """Return the pace that the bearing of a body brings with it: slow of a tired one, in a walk or run, and of one that
+    pushes a car."""
+    bearings = [each.bearing for each in stated_bearings(prompt)]
+    paces: list[Pace] = [each.pace for each in bearings if each.pace and (action in (*WAY_SPEEDS, *each.also))]
     return paces[0] if paces else ""

@@ -124,7 +124,7 @@ STATED: Mapping[str, Statement] = {
     "kick-ball": ball_kick_asked_for,
     "block": block_asked_for,
     **dict.fromkeys(("aim", "shoot"), drawn_gun),
-    "cheer": _jumps_for_joy,
+    "cheer": lambda wish, rng, seconds: dance_asked_for(wish, rng, seconds) or _jumps_for_joy(wish, rng, seconds),
     "wave": _waves,
     "sit-floor": _cross_legged,
     "kneel": lambda wish, rng, seconds: named_movement(wish, rng, seconds) or drops_asked_for(wish, rng, seconds),

@@ -35,6 +35,10 @@ SHORT_WAY = 2.5
 STRIDES, MOST_STRIDES, STRIDE_M = frozenset({"walk", "walk-backward", "sidestep"}), 6, 0.28
 """Ways that are drawn of stated steps, how many at most, and the metres of each from which on it is one in full."""
 
+TURNED, TURNS_BEFORE_S = frozenset({"turn-around"}), 0.3
+"""Turns on the spot, and the seconds before their row in which they begin: the hips turn while the body still comes out
+of what it did."""
+
 
 def describe_timeline(
     request: Request, timeline: Sequence[TimedText], limits: Limits, lists: ActionLists | None
@@ -119,7 +123,10 @@ def _match(clip: MotionClip, row: TimedText, transitions: Sequence[Mapping[str, 
     if (few := _drawn_strides(clip, row)) is not None:
         return few
     begins = [float(each["end"]) for each in transitions if each["start"] <= row.start < each["end"] < row.end]
-    frames = slice(round(max(begins, default=row.start) * clip.fps), round(row.end * clip.fps))
+    first = max(begins, default=row.start)
+    if action_of(row.text) in TURNED:
+        first = max(row.start - TURNS_BEFORE_S, 0.0)
+    frames = slice(round(first * clip.fps), round(row.end * clip.fps))
     sentences, winds = row.text.actions or (row.text.rewritten,), is_winding(row.text)
     return match_of(clip, sentences, row.scope, frames=frames, winds=winds)
 
