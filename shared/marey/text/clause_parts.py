@@ -117,7 +117,8 @@ def _parts(text: str, listed: bool) -> Iterator[tuple[str, str]]:
             continue
         if action in SERIES and "then" not in sign[0].lower():
             continue
-        in_turn = (action in ALONE and len(right.split()) > 1) or {action, after} <= BLOWS
+        evades = after == "dodge" and action in ("throw", "shoot")  # someone else throws
+        in_turn = (action in ALONE and len(right.split()) > 1) or ({action, after} <= BLOWS and not evades)
         if sign["and"] and not (listed or in_turn):
             continue
         if sign["and"] and action not in ALONE and (after in BESIDE or action in JUMPS or _GOES_ON.match(right)):

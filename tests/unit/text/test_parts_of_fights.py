@@ -78,6 +78,7 @@ def test_a_body_that_a_blast_throws_falls_and_is_no_thrower() -> None:
     ("prompt", "parts"),
     [
         ("a boxer throws two jabs and ducks", ["a boxer throws two jabs", "dodges under it"]),
+        ("someone throws a tomato at him and he dodges out of the way", []),
         ("block high, block low", ["block high", "block low"]),
         ("knocked down by explosion, slowly gets back on his feet", [THROWN_BACK, "slowly gets up"]),
         ("prone to crouch to stand", ["lies prone", "crouches", "stands up"]),
