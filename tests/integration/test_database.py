@@ -78,6 +78,33 @@ def test_the_session_of_a_connection_that_broke_is_known_as_lost(engine: sa.Engi
         assert conn.execute(sa.text("SELECT 1")).scalar_one() == 1
 
 
+def test_a_connection_is_ended_by_another_thread_while_a_call_waits_on_it(engine: sa.Engine) -> None:
+    def wait() -> None:
+        with transaction(engine) as conn:
+            driver = conn.connection.driver_connection
+            assert isinstance(driver, DeadlineConnection)
+            drivers.append(driver)
+            timer = threading.Timer(0.05, driver.shut_down)
+            timer.start()
+            try:
+                conn.execute(sa.text("SELECT pg_sleep(3)"))
+            finally:
+                timer.join()
+
+    drivers: list[DeadlineConnection] = []
+    with pytest.raises(Unreachable):
+        wait()
+    assert drivers[0].closed
+    drivers[0].shut_down()  # nothing more to end
+
+
+def test_an_error_of_a_statement_does_not_repeat_its_parameters(engine: sa.Engine) -> None:
+    """It is logged, and they hold prompts."""
+    with pytest.raises(sa.exc.DBAPIError, match="division by zero") as told, transaction(engine) as conn:
+        conn.execute(sa.text("SELECT 1 / :none, :prompt"), {"none": 0, "prompt": "a person walks to zanzibar"})
+    assert "zanzibar" not in str(told.value)
+
+
 def test_a_database_without_room_says_so_and_names_no_file_of_its_own(engine: sa.Engine) -> None:
     full = "DO $$ BEGIN RAISE disk_full USING MESSAGE = 'could not extend file \"base/5/1\"'; END $$"
     with pytest.raises(Unreachable, match="no disk space left") as told, transaction(engine) as conn:

@@ -98,6 +98,22 @@ def test_a_key_expires_at_the_end_of_its_life(engine: sa.Engine) -> None:
             check_key(conn, made.key.id)
 
 
+def test_a_key_that_no_longer_opens_is_named_by_its_public_part(engine: sa.Engine) -> None:
+    """By that the operator finds it in the list, and its secret is not shown."""
+    with transaction(engine) as conn:
+        expired, revoked, unknown = (create_key(conn, name, {"read"}, lifetime=DAY) for name in "abc")
+        revoke_key(conn, "default", revoked.key.id)
+    pass_time(engine, 2 * DAY, expired.key.id)
+    wrong = unknown.secret[:-1] + ("A" if unknown.secret[-1] != "A" else "B")
+    with transaction(engine) as conn:
+        for made, secret in ((expired, expired.secret), (revoked, revoked.secret), (unknown, wrong)):
+            with pytest.raises(Unauthenticated) as refused:
+                authenticate(conn, secret)
+            assert refused.value.where == f"marey_{made.key.prefix}_…"
+            assert "keys create" in (refused.value.hint or "")
+            assert secret.rpartition("_")[2] not in str(refused.value)
+
+
 @pytest.mark.parametrize("lifetime", [0.0, -1.0, float("nan"), 1e12])
 def test_a_life_that_cannot_be_is_refused(engine: sa.Engine, lifetime: float) -> None:
     with transaction(engine) as conn, pytest.raises(InvalidInput, match="lifetime"):

@@ -179,3 +179,21 @@ def test_plans_go_by_index_and_never_through_the_listing(engine: sa.Engine) -> N
 def test_what_is_no_reference_is_refused(engine: sa.Engine, text: str) -> None:
     with pytest.raises(InvalidInput):
         found(engine, JOB, text)
+
+
+def test_matches_say_what_a_person_chooses_by(engine: sa.Engine) -> None:
+    """Everything with a state tells it, and all tell when they were made."""
+    ids = one_of_each(engine)
+    webhook = ids[ReferenceKind.WEBHOOK]
+    told: dict[ReferenceKind, tuple[str | None, str | None]] = {}
+    with transaction(engine) as conn:
+        for kind, identifier in ids.items():
+            of = webhook if kind is ReferenceKind.DELIVERY else None
+            (match,) = resolve_reference(conn, DEFAULT_TENANT, kind, str(identifier), webhook=of)
+            assert match.created is not None
+            told[kind] = match.name, match.state
+    assert told[JOB] == ("a job", "succeeded")
+    assert told[ReferenceKind.STREAM][1] == "waiting"
+    assert told[ReferenceKind.KEY] == ("live", None)
+    assert told[ReferenceKind.DELIVERY] == ("webhook.test", "pending")
+    assert told[ReferenceKind.EVALUATION][1] is not None

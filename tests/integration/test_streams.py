@@ -66,6 +66,22 @@ def test_a_frame_is_written_under_its_number(client: redis.Redis) -> None:
     assert stream.bounds() == (0, 3)
 
 
+@pytest.mark.parametrize("read", ["xrange", "xrevrange"])
+def test_a_stream_that_goes_while_its_bounds_are_read_has_none(
+    client: redis.Redis, monkeypatch: pytest.MonkeyPatch, read: str
+) -> None:
+    stream = new_stream(client)
+    stream.write(taken(stream), frames(0, 3))
+    asked = getattr(client, read)
+
+    def gone(*args: object, **options: object) -> object:
+        client.delete(stream.frames_key)
+        return asked(*args, **options)
+
+    monkeypatch.setattr(client, read, gone)
+    assert stream.bounds() == (0, 0)
+
+
 def test_an_old_holder_cannot_write_after_the_lease_moved(client: redis.Redis) -> None:
     stream = new_stream(client)
     old = taken(stream)

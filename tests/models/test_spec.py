@@ -8,9 +8,11 @@ from typing import Any
 
 import pytest
 import torch
+from safetensors.torch import load_file
 
 from marey.core.settings import settings as process_settings
 from marey.generation.handler import GeneratorHandler
+from marey.nn.transformer import sinusoidal_positions
 from marey.registry import get_model, model_names, resolve
 from tests.support.models import load, random_bundle
 
@@ -87,3 +89,25 @@ def test_every_stage_has_its_optimisation_and_all_comes_last(model: str, tmp_pat
     assert last == "all"
     config = resolve(training.config)("tiny")
     assert {name for name in vars(config) if name.startswith("train_")} == {f"train_{stage}" for stage in stages}
+
+
+def test_tables_that_follow_from_sizes_are_not_stored_with_the_weights(generator: Any) -> None:
+    """A bundle is read by later versions, whose tables may be longer."""
+    stored = {
+        f"{file.name}: {name}": tensor.float()
+        for file in generator.bundle.path.rglob("*.safetensors")
+        for name, tensor in load_file(file).items()
+    }
+    assert stored
+    for name, tensor in stored.items():
+        table = tensor.ndim == 2 and len(tensor) > 2 and tensor.shape[1] % 2 == 0
+        assert not (table and torch.allclose(tensor, sinusoidal_positions(*tensor.shape), atol=1e-3)), name
+
+
+def test_the_moving_averages_of_codes_are_as_slow_as_the_configuration_says(generator: Any) -> None:
+    config, tokenizer = generator.config.to_dict(), resolve(spec_of(generator).tokenizer)
+    trained = spec_of(generator).training is not None
+    assert ("decay" in config["tokenizer"]) == trained
+    for decay in (0.5, 0.9) if trained else ():
+        config["tokenizer"]["decay"] = decay
+        assert tokenizer(config).quantizer.decay == decay

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import threading
+from contextlib import AbstractContextManager
 from pathlib import Path
+from typing import Any
 from uuid import UUID
 
 import httpx2
@@ -13,6 +15,7 @@ import sqlalchemy as sa
 
 from marey.core.errors import Conflict, NotFound, PluginError
 from marey.db import transaction
+from marey.db.deadlines import BULK, MAINTENANCE, Deadline
 from marey.jobs import (
     AssetDigest,
     FailureReason,
@@ -43,7 +46,7 @@ from marey.streams import (
     take_stream,
 )
 from marey.streams.rewrites import PromptRewrite
-from marey.takes import GarbageReport, collect_garbage, delete_expired, erase, rewrite_files
+from marey.takes import GarbageReport, collect_garbage, delete_expired, erase, gc, retention, rewrite_files
 from marey.tenants import DEFAULT_TENANT, create_key
 from tests.servers.audit import audit
 from tests.servers.jobs import claim_some, new_item, parse_texts, submit_items
@@ -340,6 +343,45 @@ def test_a_format_without_prompts_is_served_again_as_it_is(
         with transaction(engine) as conn:
             assert erase(conn, "default", later, by="ann").files_left == 1
         assert formats_served(engine, later) == ["bvh", "toy"]
+
+
+def test_a_format_without_prompts_serves_no_file_of_another_that_waits(
+    engine: sa.Engine, folder_store: FolderStore, tmp_path: Path
+) -> None:
+    job = made(engine, folder_store, PROMPT)
+    for name in ("toy", "zoo"):
+        add_file(engine, folder_store, job, name, f"{name} {PROMPT}".encode())
+    with transaction(engine) as conn:
+        assert erase(conn, "default", job, by="ann").files_left == 3
+    with installed(toy_plugin(tmp_path, "PLAIN")), pytest.raises(ExceptionGroup) as raised:
+        rewrite_files(engine, folder_store)
+    assert "'zoo' is installed" in str(raised.value.exceptions[0])
+    assert formats_served(engine, job) == ["bvh", "npz", "toy"]
+
+
+def test_transactions_that_remove_files_have_time_for_it(
+    engine: sa.Engine, folder_store: FolderStore, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They wait for the object store, and read many rows: an ordinary deadline would stop them again and again."""
+    kinds: list[Deadline | None] = []
+
+    def noted(engine: sa.Engine, deadline: Deadline | None = None, **more: bool) -> AbstractContextManager[Any]:
+        kinds.append(deadline)
+        return transaction(engine, deadline, **more)
+
+    for module in (retention, gc):
+        monkeypatch.setattr(module, "transaction", noted)
+    job, late = made(engine, folder_store, PROMPT), made(engine, folder_store, "a person bows", keep_days=1)
+    add_file(engine, folder_store, job, "toy", b"toy")
+    with transaction(engine) as conn:
+        erase(conn, "default", job, by="ann")
+        old = "UPDATE job SET finished_at = finished_at - interval '49 hours' WHERE id = :job"
+        conn.execute(sa.text(old), {"job": late})
+    with installed(toy_plugin(tmp_path, "PLAIN")):
+        assert rewrite_files(engine, folder_store) == 2
+    assert delete_expired(engine, folder_store) == 1
+    collect_garbage(engine, folder_store)
+    assert set(kinds) == {MAINTENANCE, BULK}
 
 
 def test_a_plugin_that_fails_is_tried_again(engine: sa.Engine, folder_store: FolderStore, tmp_path: Path) -> None:

@@ -23,6 +23,7 @@ from marey.webhooks import (
     get_webhook,
     give_back_deliveries,
     list_deliveries,
+    list_webhooks,
     record_attempt,
     replay_delivery,
     rotate_secret,
@@ -232,6 +233,34 @@ def test_a_test_message_goes_to_one_webhook_and_is_tried_once(engine: sa.Engine)
     assert (due.event, due.kind, due.data) == (sent.event, "webhook.test", {"webhook": str(webhook)})
     assert record(engine, due, REFUSED) is DeliveryState.FAILED
     assert messages_of(engine, other) == []
+
+
+def test_a_delivery_is_made_at_the_moment_of_its_event(engine: sa.Engine) -> None:
+    """Listings are in this order, also of a transaction that took long."""
+    webhook = new_webhook(engine)
+    happen(engine)
+    with transaction(engine) as conn:
+        conn.execute(sa.text("SELECT pg_sleep(0.05)"))
+        send_test(conn, DEFAULT_TENANT, webhook)
+    with transaction(engine) as conn:
+        times = {row.id: row.at for row in conn.execute(sa.text("SELECT id, at FROM webhook_event"))}
+    made = deliveries(engine, webhook)
+    assert [row.kind for row in made] == ["job.ended", "webhook.test"]
+    assert [row.created for row in made] == [times[row.event] for row in made]
+
+
+def test_a_webhook_counts_its_own_deliveries_that_wait_and_that_failed(engine: sa.Engine) -> None:
+    webhook = new_webhook(engine)
+    happen(engine, 3)
+    other = new_webhook(engine)
+    with transaction(engine) as conn:
+        sent = send_test(conn, DEFAULT_TENANT, webhook)
+    due = {each.event: each for each in claim(engine)}
+    assert record(engine, due.pop(sent.event), REFUSED) is DeliveryState.FAILED  # a test is tried once
+    assert record(engine, due.popitem()[1], ARRIVED) is DeliveryState.DELIVERED
+    with transaction(engine) as conn:
+        rows = {row.id: (row.pending, row.failed) for row in list_webhooks(conn, DEFAULT_TENANT).rows}
+    assert rows == {webhook: (2, 1), other: (0, 0)}
 
 
 def test_a_removed_webhook_takes_its_deliveries_along_also_those_under_way(engine: sa.Engine) -> None:

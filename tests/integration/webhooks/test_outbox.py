@@ -149,6 +149,21 @@ def test_a_stream_that_is_over_is_told_once(engine: sa.Engine) -> None:
     ]
 
 
+def test_open_streams_without_a_write_for_long_are_abandoned_and_no_others(engine: sa.Engine) -> None:
+    with transaction(engine) as conn:
+        key = create_key(conn, "studio", ["submit"]).key.id
+        new = NewStream(DEFAULT_TENANT, key, "dance", "stroller", "stroller-tiny@0", 1, 1200)
+        silent, written, ended = (create_stream(conn, new, limit=4) for _ in range(3))
+        assert end_stream(conn, ended, None, "stopped")
+        conn.execute(
+            sa.text("UPDATE stream SET seen_at = seen_at - interval '901 seconds' WHERE id IN (:silent, :ended)"),
+            {"silent": silent, "ended": ended},
+        )
+        assert list(abandoned_streams(conn, 900)) == [silent]
+        assert list(abandoned_streams(conn, 0)) == sorted([silent, written])
+        assert list(abandoned_streams(conn, 1000)) == []
+
+
 @pytest.mark.parametrize("regressed", [None, False, True])
 def test_an_evaluation_that_is_worse_is_told_of_a_second_time(engine: sa.Engine, regressed: bool | None) -> None:
     webhook = new_webhook(engine)

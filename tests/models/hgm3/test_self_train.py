@@ -3,6 +3,7 @@ prompt."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
@@ -93,6 +94,18 @@ def test_what_obeys_is_kept_and_what_does_not_is_tried_three_times(
     assert len(drawn.tokens) == int(drawn.lengths.sum())
     assert drawn.tokens.shape[1] == TINY.tokenizer.levels
     assert all(joined_data.clips[clip].split == "train" for clip in drawn.clips)
+
+
+def test_progress_tells_what_was_drawn_and_how_much_of_it_obeyed(
+    joined_data: PreparedData, bundle: Bundle, obeying: Callable[[str], None]
+) -> None:
+    obeying("walk")
+    reader, lines = Reader(), list[str]()
+    drawn = self_train(Generator.load(bundle, device="cpu"), reader, joined_data, 12, progress=lines.append)
+    assert lines
+    assert lines[-1].startswith(f"{len(reader.asked)} drawn, 0 to come; ")
+    shares = [tuple(map(int, found)) for found in re.findall(r"(\d+)/(\d+) of \d", lines[-1])]
+    assert [sum(each) for each in zip(*shares, strict=True)] == [len(drawn.clips), len(reader.asked)]
 
 
 def test_what_was_drawn_is_further_clips_with_the_caption_that_it_was_drawn_for(joined_data: PreparedData) -> None:

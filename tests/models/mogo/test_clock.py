@@ -24,11 +24,12 @@ def clock(hidden_share: float = 0.0) -> Clock:
 
 
 def test_nothing_is_added_where_nobody_knows_and_all_that_is_far_is_alike() -> None:
-    told = clock()(torch.tensor([UNKNOWN_TIME, 0, 3, 20, 500]))
+    told = clock()(torch.tensor([UNKNOWN_TIME, 0, 3, 20, 500, 19]))
     assert not told[0].any()
     assert told[1].any()
     assert not torch.equal(told[1], told[2])
     assert torch.equal(told[3], told[4])
+    assert not torch.equal(told[3], told[5])  # the last one that counts is 20
 
 
 def test_time_begins_anew_at_a_seam_and_counts_what_was_cut_off() -> None:

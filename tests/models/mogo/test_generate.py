@@ -20,7 +20,7 @@ from marey.models.hgm3.bundle import random_bundle as hgm3_bundle
 from marey.models.mogo.assembly import RECIPE, assemble
 from marey.models.mogo.bundle import random_bundle
 from marey.models.mogo.config import TINY, InferenceConfig
-from marey.models.mogo.generate import Generator, SamplingSettings
+from marey.models.mogo.generate import MAX_SESSIONS, Generator, SamplingSettings
 from marey.models.mogo.spec import SPEC
 from marey.models.mogo.state import NEVER
 from marey.models.mogo.streaming import StreamBatch
@@ -54,6 +54,14 @@ def test_more_requests_than_sessions_are_all_made(generator: Generator, monkeypa
     monkeypatch.setattr("marey.models.mogo.generate.MAX_SESSIONS", 2)
     found = [made.tokens for made in generator.generate(requests)]
     assert all(np.array_equal(a, b) for a, b in zip(found, wanted, strict=True))
+
+
+@pytest.mark.parametrize(("count", "rows"), [(0, 1), (1, 1), (5, 5), (MAX_SESSIONS, MAX_SESSIONS), (900, MAX_SESSIONS)])
+def test_on_a_processor_streams_have_a_row_for_each_motion_and_no_more(
+    generator: Generator, count: int, rows: int
+) -> None:
+    """Rows without a session are computed along."""
+    assert generator.streams(count, generator.config.inference).capacity == rows
 
 
 def test_an_open_length_is_the_models_within_its_limits(generator: Generator) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -75,6 +76,28 @@ def test_a_step_that_cannot_be_recorded_is_run_as_it_is_and_the_log_says_so_once
     assert [(line["log_level"], line["error"]) for line in logs] == [
         ("error", "operation not permitted when stream is capturing")
     ]
+
+
+def test_a_step_is_recorded_at_its_first_call_and_replayed_from_then_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    result, replays, recorded = torch.zeros(4, 2), list[int](), list[int]()
+
+    def replay() -> None:
+        replays.append(len(replays))
+        result.fill_(len(replays))
+
+    def record(_: Replayed) -> tuple[object, torch.Tensor]:
+        recorded.append(1)
+        return SimpleNamespace(replay=replay), result
+
+    def step(rows: int) -> torch.Tensor:
+        raise AssertionError(f"{rows} rows were computed beside the recording")
+
+    monkeypatch.setattr(Replayed, "_record", record)
+    replayed = Replayed(step, 4, CUDA)
+    first, second = replayed(2), replayed(3)
+    assert (first.shape, second.shape, recorded) == ((2, 2), (3, 2), [1])
+    assert (first == 1).all()  # the next replay overwrites the result, not what was returned
+    assert (second == 2).all()
 
 
 def test_no_room_for_a_recorded_step_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -122,6 +122,14 @@ def test_snapmogens_weights_become_a_bundle_with_its_refiner(snapmogen: Path, mo
         assert torch.equal(ours[name], value), name
 
 
+def test_the_number_of_heads_is_that_of_the_file(snapmogen: Path, models: Path, t5: Path) -> None:
+    file = snapmogen / "momask_plus" / "momaskplus_ca" / "train_momaskplus.yaml"
+    file.write_text("model:\n  n_heads: 4\n", encoding="utf-8")
+    run(snapmogen, models / "snap", t5)
+    assert SMALL[0].config.masked.heads != 4
+    assert load_networks(Bundle.open(models / "snap"))[0].masked.heads == 4
+
+
 def test_a_transformer_of_humanml3d_is_named_and_generates(humanml3d: Path, models: Path, t5: Path) -> None:
     with pytest.raises(InvalidInput, match="several transformers: hml_ca, hml_ic") as told:
         run(humanml3d, models / "hml", t5)

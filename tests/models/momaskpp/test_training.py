@@ -415,3 +415,15 @@ def test_no_tensor_of_a_training_is_made_on_another_device(prepared: PreparedDat
         check_training_elsewhere(ScaleTokenizerStage(config, data, Tokenizer(config)))
         check_training_elsewhere(masked_stage(prepared, words, config))
     check_training_elsewhere(RefinerStage(TINY, data))
+
+
+def test_batches_of_recorded_steps_have_one_shape_whatever_was_drawn(stage: ScaleStage, words: WordData) -> None:
+    """A recorded graph reads tensors of the shape that it was recorded with."""
+    batches = [stage.batch(context(step)) for step in range(6)]
+    assert {tuple(each.text.states.shape) for each in batches} == {
+        (stage.optimisation.batch, words.limit, words.states.shape[1])
+    }
+    assert len({tuple(each.shape) for batch in batches for each in (batch.tokens, batch.valid, batch.masked)}) == 1
+    rng = np.random.default_rng(0)
+    clips = stage.pairs.draw(rng, 1)
+    assert any(sample.text.states.shape[1] < words.limit for sample in stage.samples(clips, rng))

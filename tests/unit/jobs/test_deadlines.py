@@ -14,6 +14,8 @@ from marey.db.deadlines import HEARTBEAT, KINDS, MIGRATION, ORDINARY, PING_SECON
 
 ROOT = Path(__file__).resolve().parents[3]
 BAR = 15.0
+GUIDE = ROOT / "docs" / "explanation" / "reliability.md"
+UNITS = {"s": 1.0, "h": 3600.0}
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
@@ -51,3 +53,11 @@ def test_an_index_over_all_items_may_take_an_hour() -> None:
 
 def test_short_round_trips_have_no_more_time_in_all_and_long_ones_three_times_theirs() -> None:
     assert [in_all(limit) for limit in (3.0, 4.0, 4.5, 10.0)] == [3.0, 4.0, 13.5, 30.0]
+
+
+def test_the_guide_states_the_limits_of_every_kind() -> None:
+    table = GUIDE.read_text(encoding="utf-8").partition("| heartbeat of a worker |")
+    rows = (table[1] + table[2]).partition("\n\n")[0].splitlines()
+    told = [[float(n) * UNITS[unit] for n, unit in re.findall(r"\| (\d+) (s|h) (?=\|)", row)] for row in rows]
+    answers = [3600.0 if kind is MIGRATION else kind.answer for kind in KINDS]  # 1 h: two seconds are left out
+    assert told == [[kind.statement, answer, kind.idle] for kind, answer in zip(KINDS, answers, strict=True)]

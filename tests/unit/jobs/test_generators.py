@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from marey.bundles import find_bundle
+from marey.bundles.limits import settings_of
 from marey.core.settings import Settings
 from marey.items.item import Item
 from marey.items.values import MAX_SEED
@@ -68,3 +69,15 @@ def test_the_scope_of_an_edit_waits_for_the_encoder_only_where_words_leave_it_un
     assert columns.get("scope_key") == (key if prompt == UNDECIDED else None)
     assert (by_words.left is not None) == (prompt == UNDECIDED)
     assert not {"scope", "scope_key"} & EditGenerator(generator).columns(steps, "ignore").keys()
+
+
+def test_items_of_equal_settings_are_of_one_batch_in_whatever_order_they_name_them(
+    generator: GeneratorCapabilities,
+) -> None:
+    first, second, *_ = settings_of(generator.bundle)
+    named = {first.name: first.high, second.name: second.high}
+    turned = dict(reversed(named.items()))
+    another = {**named, first.name: first.low}
+    items = [(Item("a person bows", settings=settings), generator) for settings in (named, turned, another)]
+    one, same, other = (new.batch_key for new in new_items(items))
+    assert one == same != other

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
 from uuid import uuid4
 
 from marey.jobs.claim import _Lane, _preferred_first
@@ -33,3 +35,10 @@ def test_a_busier_tenant_has_less_patience_of_the_others() -> None:
     calm = [lane("a", waited=waited, running=2), lane("b", running=2)]
     assert _preferred_first(busy, "b", rules) == busy
     assert _preferred_first(calm, "b", rules) == calm[::-1]
+
+
+def test_the_guide_states_how_long_a_lane_waits_for_a_loaded_bundle() -> None:
+    guide = Path(__file__).resolve().parents[3] / "docs" / "how-to" / "tenants.md"
+    told = re.search(r"for (\d+) s at most,\s+or (\d+) s if", guide.read_text(encoding="utf-8"))
+    assert told is not None
+    assert tuple(map(float, told.groups())) == (Policy().patience, Policy().tenant_patience)

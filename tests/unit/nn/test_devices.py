@@ -36,3 +36,20 @@ def test_bfloat16_is_used_where_it_is_faster(
     assert fast_bf16(torch.device("cpu")) is fast
     monkeypatch.setenv("MAREY_BF16", "0")
     assert not fast_bf16(torch.device("cpu"))
+
+
+@pytest.mark.parametrize("name", ["auto", "cuda", "cuda:1"])
+def test_the_attention_whose_gradients_are_wrong_is_never_chosen_on_a_card(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
+    monkeypatch.setattr(torch.cuda, "device_count", lambda: 2)
+    before = torch.backends.cuda.cudnn_sdp_enabled()
+    try:
+        torch.backends.cuda.enable_cudnn_sdp(True)
+        choose_device("cpu")
+        assert torch.backends.cuda.cudnn_sdp_enabled()
+        choose_device(name)
+        assert not torch.backends.cuda.cudnn_sdp_enabled()
+    finally:
+        torch.backends.cuda.enable_cudnn_sdp(before)

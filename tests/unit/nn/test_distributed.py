@@ -75,3 +75,27 @@ def test_codes_of_a_process_without_vectors_are_those_of_the_other(monkeypatch: 
         Other(monkeypatch, shared)
         quantizer(torch.randn(2, 5, 3), nothing)
         assert torch.equal(quantizer.codebooks[0], torch.zeros(4, 3) if shared is None else theirs)
+
+
+def test_codes_of_two_processes_move_as_those_of_one_that_has_the_vectors_of_both(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Both have the same vectors here: each sum is twice its own."""
+
+    def trained(vectors: torch.Tensor) -> ResidualQuantizer:
+        torch.manual_seed(0)
+        made = ResidualQuantizer(1, 4, 3, decay=0.5, dropout=0.0, revive=0.0).train()
+        made.codebooks.normal_()
+        made.sums.copy_(made.codebooks * 4)
+        made.counts.fill_(4.0)
+        made.initialized.fill_(True)
+        made(vectors)
+        return made
+
+    own = torch.randn(2, 5, 3)
+    alone = trained(torch.cat([own, own]))
+    Other(monkeypatch, torch.zeros(4, 3))
+    monkeypatch.setattr(dist, "all_reduce", lambda tensor: tensor.add_(tensor))
+    together = trained(own)
+    torch.testing.assert_close(together.counts, alone.counts)
+    torch.testing.assert_close(together.codebooks, alone.codebooks)

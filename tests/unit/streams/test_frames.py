@@ -142,3 +142,11 @@ def test_the_example_in_the_documentation_is_a_frame():
     np.testing.assert_allclose(names["rotations"], frame.rotations, atol=1e-6)
     np.testing.assert_allclose(names["root"], frame.root)
     assert (names["number"], names["contacts"], names["last"]) == (300, [True, True, False, False], False)
+
+
+def test_a_frame_of_which_nothing_else_is_said_stands_on_no_foot_and_is_not_the_last():
+    told = frame_of()
+    plain = Frame(told.number, told.root, told.rotations)
+    back = decode_frame(encode_frame(plain))
+    for frame in (plain, back):
+        assert (frame.contacts, frame.prompt, frame.last) == ((False,) * 4, 0, False)

@@ -113,17 +113,20 @@ def test_a_sealed_secret_opens_with_its_key_also_behind_a_newer_one() -> None:
     assert b"whsec" not in sealed
     assert Vault(f"{new}\n{old}").decrypt(sealed) == "whsec_abc"
     assert Vault(new).decrypt(Vault(f"{new},{old}").encrypt("whsec_abc")) == "whsec_abc"
-    with pytest.raises(InvalidInput, match=r"^MAREY_WEBHOOK_KEY: does not open"):
+    with pytest.raises(InvalidInput, match=r"^MAREY_WEBHOOK_KEY: does not open") as refused:
         Vault(new).decrypt(sealed)
+    assert "behind the new one" in (refused.value.hint or "")
 
 
 def test_no_key_or_a_broken_one_names_the_setting() -> None:
     with pytest.raises(Refused, match="has no key") as refused:
         Vault.of(Settings(webhook_key=None))
     assert refused.value.where == "MAREY_WEBHOOK_KEY"
+    assert refused.value.hint
     for broken in ("", "abc", Fernet.generate_key().decode()[:-4]):
-        with pytest.raises(InvalidInput, match=r"^MAREY_WEBHOOK_KEY: is not a list of keys"):
+        with pytest.raises(InvalidInput, match=r"^MAREY_WEBHOOK_KEY: is not a list of keys") as told:
             Vault.of(Settings(webhook_key=SecretStr(broken)))
+        assert "openssl rand" in (told.value.hint or "")
 
 
 def test_a_home_draws_its_key_once_for_its_owner_alone(tmp_path: Path) -> None:
