@@ -13,6 +13,7 @@ import struct
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,7 @@ from marey.motion.export_options import REFERENCE_RIGS
 from marey.motion.features import LAYOUTS, HeadingLayout
 from marey.motion.feet import rule_for
 from marey.motion.finish import finish_motion
+from marey.motion.io import fbx_parse
 from marey.motion.io.convert import as_motion_clip
 from marey.motion.io.fbx_parse import FbxFile, Packed, ReadNode
 from marey.motion.kinematics import forward_kinematics
@@ -263,7 +265,8 @@ def _bvh(data: bytes) -> Any:
 
 
 def _fbx(data: bytes) -> Any:
-    file = FbxFile(data, "figures")
+    with patch.object(fbx_parse, "SKIPPED", frozenset[str]()):  # meshes and materials too
+        file = FbxFile(data, "figures")
     found = dict[str, _Parted]()
 
     def read(node: ReadNode, into: _Parted) -> None:

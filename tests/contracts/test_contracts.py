@@ -95,5 +95,5 @@ def test_a_motion_of_a_shipped_bundle_is_as_recorded(model: str, name: str, fres
 
 def test_what_is_recorded_is_compared() -> None:
     names = {path.stem for path in RECORDED.glob("*.json")}
-    assert names == {*SURFACES, "database", "events"}
+    assert names == {*SURFACES, "database", "events", "motion"}
     assert all(np.size(recorded(name)) for name in names)

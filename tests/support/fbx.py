@@ -56,6 +56,14 @@ def rewritten(data: bytes, version: int, *, packed: bool = False) -> bytes:
     return encode_nodes([_again(file, each) for each in file.top], version, packed=packed)
 
 
+def extended(data: bytes, objects: Sequence[FbxNode], links: Sequence[FbxNode] = ()) -> bytes:
+    """Return a file with more objects, and more connections."""
+    file = FbxFile(data, "extended")
+    more = {"Objects": objects, "Connections": links}
+    nodes = [_again(file, each) for each in file.top]
+    return encode_nodes([node(n.name, *n.properties, below=[*n.children, *more.get(n.name, ())]) for n in nodes])
+
+
 def _again(file: FbxFile, each: ReadNode) -> FbxNode:
     values = [file.array(each, "fdilb", most=2**20) if isinstance(v, Packed) else v for v in each.properties]
     large = [Long(v) if isinstance(v, int) and not isinstance(v, bool) and abs(v) >= 2**31 else v for v in values]

@@ -14,6 +14,7 @@ from marey.motion.clip import load_npz
 from marey.motion.export_options import ExportOptions
 from marey.motion.io.convert import clip_from_bvh
 from marey.motion.io.fbx_curves import read_animation
+from marey.motion.io.fbx_document import FbxDocument
 from marey.motion.io.fbx_nodes import TICKS
 from marey.motion.io.fbx_parse import FbxFile, text
 from marey.motion.io.fbx_read import parse_fbx, read_fbx
@@ -97,6 +98,15 @@ def test_the_file_states_its_unit_and_axis(unit, up) -> None:
     seen = clip_from_bvh(parse_fbx(data), "a")
     np.testing.assert_allclose(seen.joints, clip.joints, atol=1e-4)
     assert read_scene(data, "a").settings["UpAxis"] == ({"y": 1, "z": 2}[up],)
+
+
+def test_objects_of_equal_keys_have_identifiers_of_their_own() -> None:
+    """As those of keys whose hashes are equal; they are the same in each file."""
+    files = [FbxDocument(), FbxDocument()]
+    numbers = [[file.identifier("Model", "pelvis") for _ in range(3)] for file in files]
+    assert numbers[0] == numbers[1]
+    assert len({*numbers[0], 0}) == 4
+    assert max(numbers[0]) < 2**52
 
 
 def test_a_root_bone_moves_no_joint_and_the_pelvis_is_not_the_end_of_it() -> None:

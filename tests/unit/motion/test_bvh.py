@@ -357,6 +357,16 @@ def test_a_broken_file_gets_an_error_with_its_line(name):
         assert caught.value.where == f"a.bvh, line {line}"
 
 
+@pytest.mark.parametrize(("number", "line"), [("1e9", 20), ("-1000000000", 20), ("1.0001e9", 19), ("nan", 19)])
+def test_the_first_number_over_the_limit_is_told_and_one_at_it_is_none(number: str, line: int) -> None:
+    text = SMALL.replace("1 90 2 90 0", f"{number} 90 2 90 0")
+    if line == 20:
+        assert abs(parse(text, unit="m").root[0, 0]) == 1e9
+    with pytest.raises(InvalidFile, match="is not a number, not finite or too large") as refused:
+        parse(text.replace("1 91 2", "1 91 2e99"))
+    assert refused.value.where == f"a.bvh, line {line}"
+
+
 def test_a_missing_file_is_not_found_and_a_folder_is_no_file(tmp_path):
     for error, message, path in (
         (NotFound, "no such file", tmp_path / "none.bvh"),

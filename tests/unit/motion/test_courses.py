@@ -102,3 +102,16 @@ def test_a_foot_steps_again_only_after_it_was_carried_as_far_again() -> None:
             ahead = speed * (STEP_EVERY_S - STEP_S / 2) * 20.0  # from the middle of a step to where the next one ends
             assert carried.min() > STEP_FROM - ahead
             assert carried.max() < STEP_FROM + speed * 2 * STEP_EVERY_S * 20.0 + 0.01
+
+
+@pytest.mark.parametrize("swing", [0, 2])
+def test_the_first_and_the_last_stand_of_a_clip_begin_and_end_with_it(swing: int) -> None:
+    """Also those that a swing is before, or after, which is too short for one."""
+    stands = np.zeros(40, bool)
+    stands[swing:12] = stands[28 : 40 - swing] = True
+    clock, still = stand_clock(stands, 20.0)
+    assert still[:11].all()
+    assert still[-11:].all()
+    assert set(clock[:11]) == {(swing + 11) / 2}
+    assert set(clock[-11:]) == {39 - (swing + 11) / 2}
+    np.testing.assert_allclose(39 - clock[::-1], clock, atol=1e-9)

@@ -9,7 +9,7 @@ import pytest
 
 from marey.core.errors import InvalidInput
 from marey.motion import MotionClip, edit
-from marey.motion.edits.loop_bars import Bars, Fault
+from marey.motion.edits.loop_bars import Bars, Fault, in_place
 from marey.motion.edits.loop_blend import closed
 from marey.motion.edits.loop_ease import eased, smoothed
 from marey.motion.edits.loop_feet import stands
@@ -150,3 +150,19 @@ def test_the_reason_of_a_refusal_is_the_bar_that_is_missed_most(walk):
             faults += 1
             assert found.excess > 1.5
     assert faults > 10
+
+
+@pytest.mark.parametrize("window", [10**6, 40, 6])
+def test_a_blend_is_as_long_as_asked_but_leaves_the_first_frame_of_the_cycle(walk, window):
+    cycle = next(iter(cycles(walk, walk.contacts, 6, 100)))
+    whole = cycle.last - cycle.first
+    made = closed(walk, walk.contacts, cycle, window)
+    assert made.blend == min(window, whole - 1)
+    np.testing.assert_allclose(made.rotations[0], walk.rotations[cycle.first], atol=1e-6)
+
+
+def test_a_body_in_place_has_its_root_over_the_origin_at_its_height(walk):
+    there = in_place(walk.joints)
+    assert not there[:, 0, [0, 2]].any()
+    np.testing.assert_allclose(there[..., 1], walk.joints[..., 1])
+    np.testing.assert_allclose(there - there[:, :1], walk.joints - walk.joints[:, :1], atol=1e-6)

@@ -143,6 +143,22 @@ def test_a_motion_without_a_cycle_is_refused_with_the_bar_that_it_misses():
         edit(rising, [LOOP])
 
 
+def test_steps_that_make_no_whole_gait_are_refused_as_such_and_no_steps_with_their_length(walk):
+    (part,) = edit(walk, [{"op": "trim", "from": "f12", "to": "f24"}])
+    assert has_steps(part, part.contacts)
+    with pytest.raises(InvalidInput, match=r"^ops\.0 .*no whole gait cycle, a step of each foot") as refused:
+        edit(part, [LOOP])
+    assert refused.value.hint == "Generate a longer one: two steps of each foot or more."
+    with pytest.raises(InvalidInput, match=r"^ops\.0 .*no steps and 1\.25 s; a loop without steps has 2 s or more"):
+        edit(idle(1.25), [LOOP])
+
+
+def test_numbers_of_the_record_of_a_loop_have_six_decimals(walk):
+    (loop,) = edit(bent(walk, 0.2), [LOOP])
+    cycle = loop.manifest["loop"]["cycle"]
+    assert cycle == {name: round(value, 6) for name, value in cycle.items()}
+
+
 def test_a_loop_follows_its_record_through_other_operations(walk):
     (loop,) = edit(walk, [LOOP])
     x = loop.manifest["loop"]["cycle"]["x"]

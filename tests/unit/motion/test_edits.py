@@ -20,7 +20,7 @@ from marey.motion.edits.editing import EditSource
 from marey.motion.edits.prompts import prompt_of
 from marey.motion.edits.steps import pieces_of, read_steps
 from marey.motion.edits.table import OPERATIONS
-from marey.motion.edits.timeline_rows import prompt_after_cuts
+from marey.motion.edits.timeline_rows import frames_at_speed, prompt_after_cuts
 from marey.motion.features import HUMANML3D_263
 from marey.motion.feet import skate
 from marey.motion.finish import finish_motion
@@ -280,6 +280,39 @@ def test_spans_of_a_timeline_that_is_played_backwards_or_faster_follow_their_fra
     faster = one(with_rows(), {"op": "speed", "factor": 2}).manifest["timeline"]
     assert faster["transitions"] == [{"start": 0.5, "end": 0.6, "seed": 4}]
     assert one(with_rows(), {"op": "reverse"}, {"op": "reverse"}).manifest["prompt"] == with_rows().manifest["prompt"]
+
+
+@pytest.mark.parametrize("factor", [0.7, 1.5, 9.0])
+def test_a_loop_of_a_timeline_at_another_speed_has_the_prompt_and_the_frames_that_are_told_before(factor: float):
+    loop = {"end": "closed", "cycle": {"seconds": 2.95, "x": 0.0, "z": 0.0, "heading": 0.0}}
+    clip = replace(with_rows(), manifest={**with_rows().manifest, "loop": loop})
+    step = {"op": "speed", "factor": factor}
+    faster = one(clip, step)
+    assert faster.frames == frames_at_speed(clip.frames, factor, cycle=True)
+    told = prompt_after_cuts(clip.manifest, clip.manifest["prompt"], read_steps([step]), clip.frames, clip.fps)
+    assert told == (faster.manifest["prompt"], ())
+
+
+def test_a_cycle_has_a_frame_besides_its_first_however_fast_it_is():
+    assert frames_at_speed(2, 4.0, cycle=True) == 2
+    assert frames_at_speed(2, 4.0) == 1
+
+
+@pytest.mark.parametrize(
+    "op",
+    [
+        {"op": "trim", "from": 0.5}, {"op": "reverse"}, {"op": "smooth", "hz": 4}, {"op": "feet", "mode": "lock"},
+        {"op": "split", "at": 1.0}, {"op": "concat", "with": "next"}, {"op": "mirror"}, {"op": "speed", "factor": 2},
+        {"op": "in-place"}, {"op": "fps", "rate": 30},
+    ],
+    ids=lambda op: op["op"],
+)  # fmt: skip
+def test_an_operation_on_a_loop_keeps_its_record_or_leaves_it_out(op: dict[str, Any]):
+    loop = {"end": "closed", "cycle": {"seconds": 2.95, "x": 0.0, "z": 0.0, "heading": 0.0}}
+    clip = replace(dance(1, 60), manifest={"loop": loop})
+    kept = OPERATIONS[op["op"]].keeps_cycle
+    for made in edit(clip, [op], load=lambda _: dance(2, 30)):
+        assert ("loop" in made.manifest) is kept
 
 
 def test_a_moment_beyond_the_motion_leaves_the_prompt_to_the_worker():

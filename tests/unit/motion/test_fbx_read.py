@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from marey.core.errors import InvalidFile, InvalidInput, TooLarge
+from marey.motion.clip import MotionClip
 from marey.motion.io import fbx_parse
 from marey.motion.io.fbx_document import time_mode
-from marey.motion.io.fbx_nodes import MAGIC
+from marey.motion.io.fbx_nodes import MAGIC, Long, node
 from marey.motion.io.fbx_read import parse_fbx
 from marey.motion.io.fbx_scene import read_scene
 from marey.motion.io.fbx_write import format_fbx
@@ -20,9 +21,10 @@ from marey.motion.io.rig_fbx import parse_fbx_rig
 from marey.motion.io.rigged_fbx import format_rigged_fbx
 from marey.motion.rigs.read import read_rig
 from marey.motion.rigs.rigged import RiggedMotion
-from marey.motion.rotations import from_rotvec, multiply
+from marey.motion.rotations import angle_between, from_rotvec, multiply
+from marey.motion.skeleton import Skeleton
 from tests.support.archives import archive
-from tests.support.fbx import scene_file
+from tests.support.fbx import extended, scene_file
 from tests.support.walker import walker
 
 ORDERS = ("XYZ", "XZY", "YZX", "YXZ", "ZXY", "ZYX")
@@ -202,6 +204,57 @@ def test_a_broken_or_foreign_file_is_refused(name: str) -> None:
 def test_an_ascii_file_is_refused_with_advice() -> None:
     with pytest.raises(InvalidFile, match="Export it as binary FBX"):
         parse_fbx_rig(BROKEN["text"](b""), "a.fbx")
+
+
+@pytest.mark.parametrize(
+    "start",
+    [b"; FBX 7.4.0 project file\n" + b"; comment\n" * 300, b" \n\t;FBX", b"FBXHeaderExtension:  {\n", b";"],
+    ids=["comments alone", "blanks", "no comment", "one character"],
+)
+def test_an_ascii_file_is_told_by_its_beginning(start: bytes) -> None:
+    with pytest.raises(InvalidFile) as refused:
+        parse_fbx(start, "a.fbx")
+    assert refused.value.message == "is an ASCII FBX file; only binary ones are read"
+    assert (refused.value.where, refused.value.hint) == ("a.fbx", fbx_parse.ASCII)
+
+
+def test_the_motion_of_a_single_joint_is_read() -> None:
+    """Of a prop, or a camera."""
+    prop = Skeleton("prop", ("prop",), (-1,), np.zeros((1, 3), np.float32), (0,))
+    turns = from_rotvec(np.linspace(0, 1, 5)[:, None, None] * [0.3, -0.4, 0.2])
+    clip = MotionClip.of(prop, turns, np.linspace(0, 1, 5)[:, None] * [1.0, 2.0, 0.0], np.zeros((5, 4), bool), 20.0)
+    read = parse_fbx(format_fbx(clip))
+    assert read.skeleton.joint_names == ("prop",)
+    assert read.positions is None
+    np.testing.assert_allclose(read.root, clip.root, atol=1e-6)
+    assert angle_between(read.rotations, turns).max() < 1e-5
+
+
+def test_what_of_a_file_is_read_is_noted() -> None:
+    """Of several skeletons, animations and layers one is, and a user should learn which."""
+    data = format_fbx(walker(seconds=0.2))
+    limb = node("Model", Long(77), "prop\0\1Model", "LimbNode")
+    flags = node("NodeAttribute", Long(78), "\0\1NodeAttribute", "LimbNode", below=[node("TypeFlags", "Skeleton")])
+    prop = [node("C", "OO", Long(77), Long(0)), node("C", "OO", Long(78), Long(77))]
+    stack = next(Long(key) for key, each in read_scene(data, "a").objects.items() if each.name == "AnimationStack")
+    layer = node("C", "OO", Long(80), stack)
+    for objects, links, notes in (
+        ([], [], ()),
+        ([limb, flags], prop, ("2 skeletons in the file; that of 'pelvis' is read",)),
+        (
+            [node("AnimationStack", Long(79), "Take\0\1AnimStack", "")],
+            [],
+            ("2 animations in the file; the first that moves the skeleton is read",),
+        ),
+        (
+            [node("AnimationLayer", Long(80), "L\0\1AnimLayer", "")],
+            [layer],
+            ("2 layers of animation; the first is read",),
+        ),
+    ):
+        read = parse_fbx(extended(data, objects, links))
+        assert read.notes == notes
+        assert len(read.skeleton) == 22
 
 
 def nested(depth: int) -> bytes:

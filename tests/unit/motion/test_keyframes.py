@@ -96,6 +96,19 @@ def test_errors_of_a_file_of_constraints_name_it_and_the_field(folder: Path) -> 
         read_constraints_file(folder / "none.json", json.loads)
 
 
+def test_the_hint_of_a_constraint_that_is_refused_is_kept(folder: Path) -> None:
+    file = folder / "constraints.json"
+    file.write_text("[]")
+
+    def read(_: bytes) -> list[dict[str, Any]]:
+        raise InvalidInput("is unknown", where="constraints.0.type", hint="Name a `pose_keyframe`.")
+
+    with pytest.raises(InvalidInput) as refused:
+        read_constraints_file(file, read)
+    assert (refused.value.message, refused.value.where) == ("is unknown", f"{file}: constraints.0.type")
+    assert refused.value.hint == "Name a `pose_keyframe`."
+
+
 def test_turns_are_put_in_the_order_of_the_skeleton_by_either_spelling() -> None:
     long = [
         name.replace("L_", "left_", 1).replace("R_", "right_", 1) if name[1] == "_" else name

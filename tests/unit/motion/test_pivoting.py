@@ -62,3 +62,17 @@ def test_finished_turns_are_on_the_ball() -> None:
     clip = finish_motion(HUMANML3D_263.encode(turning(150.0)), HUMANML3D_263)
     ankle = clip.joints[:, R_ANKLE, 1]
     assert ankle[23:30].min() > ankle[:8].max() + 0.025
+
+
+@pytest.mark.parametrize(("held", "joined"), [(0, True), (1, True), (2, False)])
+def test_the_heel_stays_up_between_a_turn_and_one_back_soon_after(held: int, joined: bool) -> None:
+    """Each of them turns by 30 degrees, too few to be looked at alone; the foot rests for two frames more."""
+    joints = turning(0.0)
+    degrees = np.zeros(len(joints))
+    degrees[22:29] = np.arange(7) * 5.0
+    degrees[29 : 29 + held] = 30.0
+    degrees[29 + held : 36 + held] = 30.0 - np.arange(7) * 5.0
+    middle = joints[:, R_ANKLE] * [1.0, 0.0, 1.0]
+    turn = about("Y", np.radians(degrees))
+    joints = np.asarray(rotate(turn[:, None], joints - middle[:, None]) + middle[:, None])
+    assert (on_balls(joints, HUMANML3D, FPS) is not joints) is joined

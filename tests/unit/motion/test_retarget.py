@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -10,14 +11,17 @@ import pytest
 from marey.core.errors import InvalidInput
 from marey.motion.clip import MotionClip
 from marey.motion.export_options import ExportOptions
+from marey.motion.io.bvh import BvhClip
+from marey.motion.retarget.align import Alignment
 from marey.motion.retarget.apply import on_body
 from marey.motion.retarget.load import load_body
 from marey.motion.retarget.reference import REFERENCES, reference_rig
 from marey.motion.retarget.retarget import retarget
-from marey.motion.retarget.source import rig_of, source_of
+from marey.motion.retarget.source import rig_of, source_of, source_on
 from marey.motion.rigs.body import RigBody
-from marey.motion.rotations import Array, angle_between, conjugate, from_rotvec, normalize, rotate, to_matrix
-from marey.motion.skeleton import HUMANML3D, SKELETONS, mirror_by_name
+from marey.motion.rigs.joint_map import map_joints
+from marey.motion.rotations import Array, about, angle_between, conjugate, from_rotvec, normalize, rotate, to_matrix
+from marey.motion.skeleton import HUMANML3D, SKELETONS, Skeleton, mirror_by_name, skeleton_of
 from tests.support.changed_rigs import Change, lively, source_on_rig
 from tests.support.walker import walker
 
@@ -192,6 +196,56 @@ def test_hands_reach_on_request():
         hips = (places[:, parts["left_upper_leg"]] + places[:, parts["right_upper_leg"]]) / 2
         found.append(np.linalg.norm(places[:, parts["right_hand"]] - hips - goal, axis=-1).max())
     assert found[1] < 0.01 < found[0]
+
+
+@pytest.mark.parametrize("part", ["hand", "lower_arm", "upper_arm"])
+def test_hands_reach_on_the_side_that_has_an_arm_and_the_other_is_left(part):
+    """Also where the source has no such part and the rig has."""
+    source = source_of(WALK)
+    bare = RigBody.of(reference_rig("mixamo"), map_joints(reference_rig("mixamo"), {f"left_{part}": None}))
+    own = RigBody.of(source.body.rig, map_joints(source.body.rig, {f"left_{part}": None}))
+    for theirs, body in ((source, bare), (replace(source, body=own), load_body("mixamo"))):
+        still, reaching = (retarget(theirs, body, hands=hands).world()[1] for hands in (False, True))
+        moved = np.abs(reaching - still).max(axis=(0, 2))
+        assert moved[body.map.parts["right_hand"]] > 0.01
+        assert moved[body.rig.index("mixamorig:LeftHand")] < 1e-9
+
+
+def _without_arms(skeleton: Skeleton) -> Skeleton:
+    kept = [
+        joint for joint, name in enumerate(skeleton.joint_names) if not re.search("collar|should|elbow|wrist", name)
+    ]
+    names = tuple(skeleton.joint_names[joint] for joint in kept)
+    parents = tuple(kept.index(skeleton.parents[joint]) if joint else -1 for joint in kept)
+    return Skeleton("armless", names, parents, skeleton.offsets[kept], mirror_by_name(names))
+
+
+@pytest.mark.parametrize("armless", ["source", "rig", "both"])
+def test_a_trunk_without_arms_stays_upright_where_directions_decide(armless):
+    """As from a body that sits at rest; of a body without arms the head tells where the trunk ends."""
+    plain = rig_of(HUMANML3D), rig_of(_without_arms(HUMANML3D))
+    source, target = plain[armless != "rig"], plain[armless != "source"]
+    knees = [source.index(f"{side}_{name}") for side in "LR" for name in ("knee", "ankle", "foot")]
+    places = source.positions.copy()
+    hips = places[source.index("pelvis")]
+    places[knees] = hips + rotate(about("X", -1.4), places[knees] - hips)
+    sitting = RigBody.of(replace(source, positions=places))
+    assert not sitting.standing
+    turns = Alignment(sitting, RigBody.of(target)).turns
+    names = [f"spine{number}" for number in range(1, 4)]
+    trunk = np.array([turns[name] for name in names])
+    assert angle_between(trunk, np.array([1.0, 0.0, 0.0, 0.0])).max() < np.radians(10)
+
+
+def test_a_clip_without_a_joint_of_the_rig_is_refused_with_the_name_of_the_rig():
+    body, (rotations, root) = RigBody.of(rig_of(HUMANML3D)), (WALK.rotations.astype(float), WALK.root.astype(float))
+    clip = BvhClip(HUMANML3D, rotations, root, None, WALK.fps, np.full((22, 3), np.nan))
+    np.testing.assert_allclose(source_on(body, clip).joints, WALK.joints, atol=1e-5)
+    less = skeleton_of(HUMANML3D.joint_names[:-1], HUMANML3D.parents[:-1], HUMANML3D.offsets[:-1])
+    with pytest.raises(InvalidInput) as refused:
+        source_on(body, replace(clip, skeleton=less, rotations=rotations[:, :-1], ends=clip.ends[:-1]))
+    assert refused.value.message == "the motion has no joint 'R_wrist'"
+    assert refused.value.where == "humanml3d"
 
 
 def test_reference_skeletons_are_pinned():

@@ -23,9 +23,11 @@ from marey.motion.io.rig_gltf import MAX_NODES, parse_glb_rig, parse_gltf_rig
 from marey.motion.io.rig_json import format_json_rig, parse_json_rig
 from marey.motion.io.rigged_bvh import format_rigged_bvh
 from marey.motion.io.rigged_glb import format_rigged_glb
+from marey.motion.io.rigged_glb_read import hips_motion
 from marey.motion.retarget.apply import on_body
 from marey.motion.retarget.load import load_body
 from marey.motion.retarget.reference import REFERENCES, reference_rig
+from marey.motion.retarget.source import rig_of
 from marey.motion.rigs.body import RigBody
 from marey.motion.rigs.joint_map import map_joints, read_map
 from marey.motion.rigs.read import read_rig
@@ -34,7 +36,8 @@ from marey.motion.rigs.report import describe
 from marey.motion.rigs.rig import MAX_JOINTS
 from marey.motion.rigs.words import read_names
 from marey.motion.rotations import about, angle_between, multiply, rotate
-from marey.motion.skeleton import HUMANML3D, SNAPMOGEN
+from marey.motion.skeleton import HUMANML3D, SNAPMOGEN, skeleton_of
+from marey.motion.units import FARTHEST
 from tests.support.changed_rigs import Change
 from tests.support.walker import walker
 
@@ -98,6 +101,23 @@ def test_scaled_nodes_keep_their_own_units():
     assert np.allclose(written.scales, rig.scales)
 
 
+def test_a_motion_of_scaled_nodes_has_the_scales_of_all_nodes_above():
+    def node(name, place, scale, *children):
+        return {
+            "name": name, "rotation": [0, 0, 0, 1], "translation": place, "scale": [scale] * 3, "children": children,
+        }  # fmt: skip
+
+    nodes = [
+        node("Armature", [0, 0, 0], 0.01, 1),
+        node("hips", [0, 90, 0], 2.0, 2),
+        node("knee", [0, -20, 0], 0.5, 3),
+        node("foot", [10, -30, 0], 1.0),
+    ]
+    motion = hips_motion(nodes, {}, {1: np.array([[0, 90, 0], [0, 90, 20]], np.float32)}, 1)
+    np.testing.assert_allclose(motion.root, [[0, 0.9, 0], [0, 0.9, 0.2]], atol=1e-6)
+    np.testing.assert_allclose(motion.skeleton.offsets[1:], [[0, -0.4, 0], [0.1, -0.3, 0]], atol=1e-6)
+
+
 def test_json_keeps_unit_and_axis():
     rig = Change(4, "a", 4, 0.01, "z").rig()
     read = parse_json_rig(format_json_rig(rig), "x.json")
@@ -147,6 +167,64 @@ def test_joints_without_telling_names_are_found_by_shape(seed):
     assert {part: blind.parts.get(part) for part in limbs} == {part: named.parts[part] for part in limbs}
 
 
+def _grown(skeleton, chain, over, *, without=()):
+    """A rig whose joints have no telling names: some left out, and on both sides a chain of more joints over one."""
+    kept = [joint for joint, name in enumerate(skeleton.joint_names) if name not in without]
+    parents = [kept.index(skeleton.parents[joint]) if joint else -1 for joint in kept]
+    offsets = [skeleton.offsets[joint] for joint in kept]
+    for side in (1.0, -1.0):
+        above = kept.index(skeleton.index(over))
+        for bone in chain:
+            parents.append(above)
+            offsets.append(np.array(bone, np.float32) * [side, 1.0, 1.0])
+            above = len(parents) - 1
+    names = tuple(f"joint{joint}" for joint in range(len(parents)))
+    return rig_of(skeleton_of(names, tuple(parents), np.array(offsets, np.float32)))
+
+
+@pytest.mark.parametrize("joints", [1, 2])
+@pytest.mark.parametrize("over", ["spine3", "head", "pelvis"])
+def test_chains_of_one_and_two_joints_are_no_limbs_however_long(joints, over):
+    """Wings, ears, or the tails of a coat."""
+    bare = _grown(HUMANML3D, [], "spine3")
+    grown = _grown(HUMANML3D, [(0.9, 0.2, -0.1)] * joints, over)
+    limbs = [part for part in map_joints(bare).parts if part.startswith(("left", "right"))]
+    assert len(limbs) >= 14
+    found = map_joints(grown).parts
+    assert {part: found[part] for part in limbs} == {part: map_joints(bare).parts[part] for part in limbs}
+
+
+def test_sides_are_not_guessed_where_the_legs_end_at_the_ankles():
+    offsets = HUMANML3D.offsets.copy()
+    offsets[[HUMANML3D.index(f"{side}_ankle") for side in "LR"], 2] = -0.1
+    with pytest.raises(InvalidInput, match="no joint found for right upper leg, right lower leg, right foot"):
+        map_joints(_grown(HUMANML3D.with_offsets(offsets), [], "spine3", without=("L_foot", "R_foot")))
+
+
+def test_parts_that_a_vrm_file_leaves_out_are_found_by_their_words():
+    """It has to state arms and legs, but not collar bones and toes."""
+    words = {
+        "hip": "thigh", "knee": "shin", "ankle": "ankle", "foot": "toes", "collar": "shoulder", "shoulder": "upperarm",
+        "elbow": "forearm", "wrist": "palm",
+    }  # fmt: skip
+    stated = {
+        "hip": "UpperLeg", "knee": "LowerLeg", "ankle": "Foot", "shoulder": "UpperArm", "elbow": "LowerArm",
+        "wrist": "Hand",
+    }  # fmt: skip
+    names, humanoid = list[str](), {"hips": 0, "head": HUMANML3D.index("head")}
+    for joint, name in enumerate(HUMANML3D.joint_names):
+        side, _, part = name.rpartition("_")
+        word = {"L": "left", "R": "right"}.get(side, "")
+        names.append(f"body {words.get(part, part)} {word}" if side else f"body {part}")
+        if side and part in stated:
+            humanoid[f"{word}{stated[part]}"] = joint
+    rig = load_skeleton(tuple(names), HUMANML3D)
+    found = map_joints(replace(rig, extras={"humanoid": humanoid, "order": list(range(len(names)))}))
+    assert dict(found.parts) == dict(map_joints(load_skeleton(HUMANML3D.joint_names, HUMANML3D)).parts)
+    for part, of in (("shoulder", "words"), ("toes", "words"), ("upper_arm", "file"), ("foot", "file")):
+        assert {found.how[f"{side}_{part}"] for side in ("left", "right")} == {of}
+
+
 def test_effectors_and_controllers_are_no_parts():
     rig = reference_rig("humanik")
     names = tuple("LeftHandEffector" if name == "LeftArmRoll" else name for name in rig.joint_names)
@@ -190,8 +268,6 @@ def test_renamed_joints_are_found_again(skeleton, names):
 
 
 def load_skeleton(names, skeleton):
-    from marey.motion.retarget.source import rig_of
-
     return replace(rig_of(skeleton), joint_names=names)
 
 
@@ -356,6 +432,17 @@ def test_the_smallest_and_the_largest_unit_are_read(unit):
     document = json.loads(_json_rig([-1, 0, 1])) | {"unit": unit}
     document["joints"] = [{**joint, "position": [0, 0, 0]} for joint in document["joints"]]
     assert parse_json_rig(json.dumps(document).encode(), "x.json").unit == unit
+
+
+def test_joints_may_be_as_far_from_the_origin_as_the_limit_says():
+    document = json.loads(_json_rig([-1, 0, 1])) | {"unit": 1.0}
+    for far, read in ((FARTHEST, True), (-FARTHEST, True), (FARTHEST * 1.001, False)):
+        document["joints"][2]["position"] = [0.0, far, 0.0]
+        if read:
+            assert parse_json_rig(json.dumps(document).encode(), "x.json").positions[2, 1] == far
+            continue
+        with pytest.raises(TooLarge, match=r"^x\.json: the node 'j2' is 1e\+06 m from the origin, over the limit"):
+            parse_json_rig(json.dumps(document).encode(), "x.json")
 
 
 @pytest.mark.parametrize(

@@ -135,3 +135,14 @@ def test_a_run_between_stands_passes_into_them_without_a_jump() -> None:
     assert 0 < first < last < len(whole) - 1
     assert change[[first, last]].max() < 1e-6
     assert change.max() > 0.01
+
+
+def test_a_run_that_is_played_backwards_has_the_same_flights() -> None:
+    joints = np.array(Body(6.0, speed=lambda t: np.interp(t, [1.5, 2.0, 3.5, 4.1], [0.0, 3.5, 3.5, 0.0])).joints())
+    contacts, runs = np.ones((len(joints), 4), bool), np.ones(len(joints), bool)
+    for begin, end in ((45, 49), (54, 57), (61, 66)):
+        contacts[begin:end] = False
+    there = with_flights(joints, contacts, runs, HUMANML3D, FPS)[:, 0]
+    back = with_flights(joints[::-1], contacts[::-1], runs, HUMANML3D, FPS)[::-1, 0]
+    assert np.abs(there - joints[:, 0]).max() > 0.01
+    np.testing.assert_allclose(back, there, atol=1e-6)
