@@ -23,7 +23,7 @@ from marey.motion.clip import SELECTION, MotionClip
 from marey.quality.postures import rises_of
 from marey.quality.record import PromptMatch
 from marey.quality.selection import Selection
-from marey.selector.matching import side_of
+from marey.selector.matching import ON_THE_SPOT, side_of
 from marey.selector.records import match_of
 from marey.vocabulary.counts import stated_count
 from marey.vocabulary.loads import puts_load
@@ -35,9 +35,9 @@ SHORT_WAY = 2.5
 STRIDES, MOST_STRIDES, STRIDE_M = frozenset({"walk", "walk-backward", "sidestep"}), 6, 0.28
 """Ways that are drawn of stated steps, how many at most, and the metres of each from which on it is one in full."""
 
-TURNED, TURNS_BEFORE_S = frozenset({"turn-around"}), 0.3
-"""Turns on the spot, and the seconds before their row in which they begin: the hips turn while the body still comes out
-of what it did."""
+TURNS_BEFORE_S = 0.3
+"""Seconds before its row in which a turn on the spot begins: the hips turn while the body still comes out of what it
+did."""
 
 
 def describe_timeline(
@@ -124,7 +124,7 @@ def _match(clip: MotionClip, row: TimedText, transitions: Sequence[Mapping[str, 
         return few
     begins = [float(each["end"]) for each in transitions if each["start"] <= row.start < each["end"] < row.end]
     first = max(begins, default=row.start)
-    if action_of(row.text) in TURNED:
+    if action_of(row.text) == ON_THE_SPOT:
         first = max(row.start - TURNS_BEFORE_S, 0.0)
     frames = slice(round(first * clip.fps), round(row.end * clip.fps))
     sentences, winds = row.text.actions or (row.text.rewritten,), is_winding(row.text)
